@@ -9,8 +9,8 @@
 namespace hermesh {
 
 std::span<const Extractor> our_extractors() {
-  // Promises are what the harness holds against every mesh of a variant: a promise that is missing here is a
-  // property that the method does not have, for the reason in its header.
+  // The harness checks the promises with every mesh of a variant: a missing promise is a property that the
+  // method does not have, for the reason in its header.
   static const std::vector<Extractor> table = {
       {.name = "marching-cubes",
        .summary = "triangles from a table of 256 sign patterns, closed and manifold (Lorensen & Cline 1987, "
@@ -18,24 +18,22 @@ std::span<const Extractor> our_extractors() {
        .promises = {.closed = true, .manifold = true, .oriented = true},
        .options = marching_cubes_options(),
        .extract = marching_cubes},
-      // One point a cell, which all sheets in the cell share: closed, but not manifold.
+      // One vertex for each cell, shared by all sheets in it: closed, but not manifold.
       {.name = "dual-contouring",
        .summary = "uniform dual contouring of Hermite data, keeps sharp features (Ju et al. 2002; Aldén "
                   "2011, chapter 6)",
        .promises = {.closed = true, .oriented = true},
        .options = dual_contouring_options(),
        .extract = dual_contouring},
-      // Chapter 6 with its faults: regions of several sheets share a point, too (trap T5), and crossings that
-      // its 10-byte data lose leave holes (trap T2), so that it promises nothing. With other data it is
-      // closed and oriented.
+      // Chapter 6 with its faults: the sheets of a region share a vertex, too (trap T5), and crossings lost
+      // in its 10-byte data leave holes (trap T2), so it promises nothing. With other data it is closed and
+      // oriented.
       {.name = "adaptive-dual-contouring",
        .summary = "cells merged into 2³, 4³ and 8³ regions within each block, of 10-byte data, as printed "
-                  "(Aldén 2011, "
-                  "chapters 4 and 6)",
+                  "(Aldén 2011, chapters 4 and 6)",
        .promises = {},
        .options = adaptive_dual_contouring_options(),
        .extract = adaptive_dual_contouring},
-      // The only one whose mesh is proved free of self-intersection.
       {.name = "manifold-dual-contouring",
        .summary = "adaptive dual contouring within a stated tolerance: closed, manifold, free of "
                   "self-intersection, sharp",

@@ -5,7 +5,7 @@
 hermesh_packages=(
   g++ cmake ninja-build ccache pkg-config ca-certificates git
   libopenvdb-dev libtbb-dev libeigen3-dev libimath-dev libboost-dev libcgal-dev libopenmesh-dev libembree-dev
-  libcairo2-dev libcli11-dev libtomlplusplus-dev nlohmann-json3-dev libssl-dev zlib1g-dev libzip-dev
+  libcairo2-dev libcli11-dev libtomlplusplus-dev nlohmann-json3-dev libssl-dev zlib1g-dev libminizip-dev
   libexpat1-dev libbenchmark-dev libgtest-dev
   libopenvdb-tools python3 pybind11-dev python3-dev python3-numpy python3-scipy python3-matplotlib python3-jinja2 python3-venv)
 

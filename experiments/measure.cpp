@@ -25,7 +25,7 @@ std::optional<std::int64_t> status_bytes(const std::string& key) {
   return std::nullopt;
 }
 
-/// "5" sets the high-water mark to what is resident now (Linux 4.0 and later).
+/// "5" sets the high-water mark to the memory that is resident now (Linux 4.0 and later).
 bool reset_high_water_mark() {
   std::ofstream clear("/proc/self/clear_refs");
   clear << "5" << std::flush;
@@ -66,9 +66,9 @@ PeakMemory::PeakMemory() {
 #endif
   const bool reset = reset_high_water_mark();
   const auto resident = status_bytes("VmRSS"), peak = status_bytes("VmHWM");
-  // Kernels count resident pages in batches a thread, so a mark just reset may stand a little off the present
-  // figure. A mark that stands far above it was not reset in spite of the kernel's answer; differences to it
-  // mean nothing.
+  // Kernels count resident pages in batches per thread, so a mark just reset may be slightly above the
+  // present value. A mark far above it was not reset in spite of the kernel's answer; differences to it mean
+  // nothing.
   constexpr std::int64_t kBatches = 16 << 20;
   if (reset && resident && peak && *peak <= *resident + kBatches) start_ = std::max(*resident, *peak);
 }
@@ -94,12 +94,12 @@ double process_cpu_seconds() {
 
 namespace {
 
-/// Who runs at a place of a round of a race, see race(): 0, 1, n − 1, 2, n − 2, …, turned by one in every
-/// round; where n is odd every other round is mirrored.
-std::size_t runner(std::size_t place, std::size_t round, std::size_t n) {
-  if (n % 2 == 1 && round % 2 == 1) place = n - 1 - place;
-  const std::size_t step = (place + 1) / 2;
-  return (round + (place % 2 == 1 ? step : n - step)) % n;
+/// Returns the contender at a position of a round, see race(): 0, 1, n − 1, 2, n − 2, …, rotated by one in
+/// every round; if n is odd, every other round is mirrored.
+std::size_t runner(std::size_t position, std::size_t round, std::size_t n) {
+  if (n % 2 == 1 && round % 2 == 1) position = n - 1 - position;
+  const std::size_t step = (position + 1) / 2;
+  return (round + (position % 2 == 1 ? step : n - step)) % n;
 }
 
 }  // namespace
@@ -111,10 +111,22 @@ void race(std::span<Contender> contenders) {
                                          used < contender.budget_seconds);
   };
   for (std::size_t round = 0; std::any_of(contenders.begin(), contenders.end(), wants_more); ++round)
-    for (std::size_t place = 0; place < contenders.size(); ++place) {
-      Contender& contender = contenders[runner(place, round, contenders.size())];
+    for (std::size_t position = 0; position < contenders.size(); ++position) {
+      Contender& contender = contenders[runner(position, round, contenders.size())];
       if (wants_more(contender)) contender.seconds.push_back(contender.run());
     }
+}
+
+std::vector<std::vector<double>> race(const std::vector<std::function<double()>>& work, int repetitions,
+                                      double budget_seconds, bool warm) {
+  std::vector<Contender> contenders;
+  for (const auto& run : work) contenders.push_back({run, budget_seconds, repetitions, {}});
+  if (warm)
+    for (const auto& run : work) run();
+  race(contenders);
+  std::vector<std::vector<double>> seconds;
+  for (Contender& contender : contenders) seconds.push_back(std::move(contender.seconds));
+  return seconds;
 }
 
 }  // namespace hermesh

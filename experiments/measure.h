@@ -23,9 +23,10 @@ using StageSeconds = std::vector<std::pair<std::string, double>>;
 /// runs several times in one repetition counts with its sum; one that a repetition lacks counts there as 0.
 StageSeconds median_stages(std::span<const StageSeconds> repetitions);
 
-/// The peak of resident memory since construction, beyond what was resident then. The allocator first gives
-/// back what it only hoards, and the kernel's high-water mark is reset; where that is not possible (no /proc,
-/// or not writable) the figure is missing rather than wrong. One at a time: the mark belongs to the process.
+/// Measures the peak of resident memory since construction, less the resident memory at construction. The
+/// allocator first returns its unused memory, and the kernel's high-water mark is reset; where that is not
+/// possible (no /proc, or not writable) the value is missing rather than wrong. Only one instance at a time:
+/// the mark belongs to the process.
 class PeakMemory {
  public:
   PeakMemory();
@@ -41,7 +42,7 @@ double timed(const std::function<void()>& work);
 /// CPU seconds of the whole process so far, all threads, in the program and in the kernel.
 double process_cpu_seconds();
 
-/// One competitor in a race of repetitions.
+/// One contender of an interleaved timing.
 struct Contender {
   std::function<double()> run;  ///< does the work once and returns its seconds
   double budget_seconds = 5.0;
@@ -49,12 +50,18 @@ struct Contender {
   std::vector<double> seconds;  ///< out: one entry a repetition
 };
 
-/// In rounds, so that a slow minute of a shared machine hits all alike. The order changes from round to round
-/// so that over n rounds (2n if n is odd) each contender runs as often at each place and, within rounds, as
-/// often after each other one (Williams, Experimental Designs Balanced for the Estimation of Residual Effects
-/// of Treatments, 1949): what runs before matters, for memory that it gave back has to be fetched again. Each
-/// contender runs at least once, then until it has `repetitions` or its own times have used up its budget. A
-/// contender that already holds as many seconds as its budget does not run again.
+/// Runs the contenders in rounds, so that a slow minute of a shared machine affects all of them. The order
+/// changes from round to round so that over n rounds (2n if n is odd) each contender runs equally often at
+/// each position and, within rounds, after each other one (Williams, Experimental Designs Balanced for the
+/// Estimation of Residual Effects of Treatments, 1949): the previous contender matters, since memory that it
+/// released has to be fetched again. Each contender runs at least once, then until it has `repetitions` or
+/// its own times have used up its budget. A contender that already has as many seconds as its budget does not
+/// run again.
 void race(std::span<Contender> contenders);
+
+/// Does the same for work with equal numbers of repetitions and budgets; returns the seconds of each. If
+/// `warm`, each runs once before, untimed, to warm caches and thread pools.
+std::vector<std::vector<double>> race(const std::vector<std::function<double()>>& work, int repetitions,
+                                      double budget_seconds = 1e9, bool warm = false);
 
 }  // namespace hermesh

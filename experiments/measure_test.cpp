@@ -3,7 +3,6 @@
 #include <gtest/gtest.h>
 
 #include <chrono>
-#include <fstream>
 #include <map>
 #include <numeric>
 #include <string>
@@ -12,7 +11,7 @@
 #include <vector>
 
 namespace hermesh {
-namespace {
+namespace measure_test {
 
 TEST(Median, OfFew) {
   EXPECT_EQ(median({}), 0.0);
@@ -29,7 +28,7 @@ TEST(Median, StagesKeepTheirOrderAndAddUpWithinARepetition) {
   EXPECT_EQ(median_stages(repetitions), expected);
 }
 
-/// Who ran, a letter each, in a race of so many rounds.
+/// The order in which the contenders ran, a letter each, in `rounds` rounds of interleaved timing.
 std::string order_of_race(int contenders, int rounds) {
   std::string order;
   std::vector<Contender> all(contenders);
@@ -102,5 +101,5 @@ TEST(PeakMemory, SeesWhatWasTakenAndGivenBackButNotWhatWasThereBefore) {
   EXPECT_EQ(before[before.size() / 2], 1);
 }
 
-}  // namespace
+}  // namespace measure_test
 }  // namespace hermesh

@@ -68,7 +68,7 @@ MeshFile as_written(const PolygonMesh& mesh, const std::string& format, RunConte
   return read_mesh_file(file.path, context);
 }
 
-// ---- Promises.
+// ---- Guarantees.
 
 namespace {
 
@@ -76,8 +76,8 @@ std::string counted(std::int64_t count, const char* what) { return std::to_strin
 
 void check_bound(const Circumstances::Bound& bound, const MeshReport& report,
                  std::vector<std::string>& broken) {
-  // In voxels: what is promised beyond the tolerance, by how much the certified distance may exceed the true
-  // one (certify_gap), and what single precision in the file moves points by.
+  // In voxels: the guaranteed excess over the tolerance, the gap between certified and true distance
+  // (certify_gap), and the effect of single precision in the file.
   constexpr double kSlack = 0.005 + 0.001 + 1e-4;
   const auto certify = [&](const std::optional<validation::HausdorffBound>& distance, const char* way) {
     if (distance && distance->upper / bound.voxel_size > bound.tolerance + kSlack)
@@ -91,14 +91,22 @@ void check_bound(const Circumstances::Bound& bound, const MeshReport& report,
     broken.push_back("topology (other than the uniform mesh's)");
 }
 
+struct NamedPromise {
+  bool Promises::*promised;
+  const char* word;
+  char letter;
+};
+constexpr NamedPromise kPromises[] = {{&Promises::closed, "closed", 'c'},
+                                      {&Promises::manifold, "manifold", 'm'},
+                                      {&Promises::oriented, "oriented", 'o'},
+                                      {&Promises::no_self_intersection, "no self-intersection", 'i'}};
+
 }  // namespace
 
 std::vector<std::string> promise_words(const Promises& promises) {
   std::vector<std::string> words;
-  if (promises.closed) words.push_back("closed");
-  if (promises.manifold) words.push_back("manifold");
-  if (promises.oriented) words.push_back("oriented");
-  if (promises.no_self_intersection) words.push_back("no self-intersection");
+  for (const auto& [promised, word, letter] : kPromises)
+    if (promises.*promised) words.push_back(word);
   return words;
 }
 
@@ -113,9 +121,8 @@ PromiseCheck check_promises(const Promises& promises, const MeshReport& report,
                            counted(vertices, "vertices are not)"));
   if (promises.oriented && !report.oriented())
     check.broken.push_back("oriented (" + counted(report.inconsistent_edges, "inconsistent edges)"));
-  // A component all of whose polygons are flipped has no inconsistent edge, but its volume is then negative.
-  // Components of a mesh that may intersect itself have no inside of their own, and only the whole is looked
-  // at.
+  // A completely flipped component has no inconsistent edge, but a negative volume. Components of a mesh that
+  // may intersect itself have no inside of their own, so only the whole is checked.
   const bool inside_out =
       (promises.no_self_intersection && !report.faces_outwards()) || (report.closed() && report.volume < 0.0);
   if (promises.oriented && report.oriented() && inside_out && !circumstances.encloses_the_outside)
@@ -148,22 +155,20 @@ std::string promise_verdict(const Promises& promises, const PromiseCheck& check)
 
 std::string promise_letters(const Promises& promises, const PromiseCheck& check) {
   std::string letters;
-  if (promises.closed) letters += 'c';
-  if (promises.manifold) letters += 'm';
-  if (promises.oriented) letters += 'o';
-  if (promises.no_self_intersection) letters += 'i';
+  for (const auto& [promised, word, letter] : kPromises)
+    if (promises.*promised) letters += letter;
   if (letters.empty()) return "none";
   return letters + (!check.broken.empty() ? " BROKEN" : check.unchecked.empty() ? " kept" : " unchecked");
 }
 
-Judgement judge(const MeshFile& mesh, const Promises& promises, const validation::JudgeOptions& options,
+Judgement judge(const MeshFile& mesh, const Promises& promises, const validation::CheckOptions& options,
                 RunContext& context, const Circumstances& circumstances) {
-  Judgement result{validation::judge(mesh, options, context), {}};
+  Judgement result{validation::check_mesh(mesh, options, context), {}};
   result.promises = check_promises(promises, result.report, circumstances);
   return result;
 }
 
-// ---- All of it.
+// ---- All stages.
 
 Outcome run(const Job& job, RunContext& context) {
   Outcome result;

@@ -7,7 +7,7 @@
 #include "experiments/cases/test_volumes.h"
 
 namespace hermesh {
-namespace {
+namespace pipeline_test {
 
 using validation::MeshReport;
 using Sentences = std::vector<std::string>;
@@ -87,7 +87,7 @@ TEST(PromiseCheck, ABoundIsInVoxelsAndBothWays) {
   report.certified_to_reference = {.lower = 0.0, .upper = 0.19};
   const Circumstances circumstances{.bound = Circumstances::Bound{0.1, 2.0, &uniform}};
   EXPECT_TRUE(check_promises({}, report, circumstances).broken.empty());
-  // 0.005 voxel of the proof and 0.001 of the judge come on top, and no more.
+  // Only 0.005 voxel for the proof and 0.001 for the validator are added.
   report.certified_to_reference->upper = 2.0 * (0.1 + 0.006);
   EXPECT_TRUE(check_promises({}, report, circumstances).broken.empty());
   report.certified_to_reference->upper = 2.0 * (0.1 + 0.0065);
@@ -146,5 +146,5 @@ TEST(Pipeline, NamesThatThereAreNotAreRefused) {
   EXPECT_THROW(choose(our_extractors(), "marching-cubes", {{"horn", "1"}}), Error);
 }
 
-}  // namespace
+}  // namespace pipeline_test
 }  // namespace hermesh

@@ -1,4 +1,5 @@
-// What a program was built from and with. Rows contain it, since measurements without it cannot be compared.
+// The sources and tools that a program was built from and with. Rows contain them, since measurements without
+// them cannot be compared.
 #pragma once
 
 #include <nlohmann/json_fwd.hpp>

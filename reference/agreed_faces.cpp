@@ -23,7 +23,7 @@ double area(const PolygonMesh& mesh, const Triangle& t) {
   return 0.5 * ab.cross(ac).norm();
 }
 
-/// Whether two triangles have the same points in the same cyclic order.
+/// Returns true if two triangles have the same points in the same cyclic order.
 bool same_winding(const std::vector<Point>& a_points, const std::vector<std::size_t>& a,
                   const std::vector<Point>& b_points, const std::vector<std::size_t>& b) {
   for (std::size_t shift = 0; shift < 3; ++shift) {

@@ -7,7 +7,7 @@
 #include "reference/test_meshes.h"
 
 namespace hermesh {
-namespace {
+namespace agreed_faces_test {
 
 TEST(AgreedFaces, TurnAFewFacesOfAClosedMeshAndOfAnOpenOne) {
   const PolygonMesh sphere = test::sphere(1.0, 3);
@@ -31,5 +31,5 @@ TEST(AgreedFaces, KeepTheWindingOfEachPatch) {
   EXPECT_EQ(with_agreeing_faces(shells).triangles, shells.triangles);
 }
 
-}  // namespace
+}  // namespace agreed_faces_test
 }  // namespace hermesh

@@ -48,8 +48,8 @@ using Kernel = Triangulation::Geom_traits;
 using Point = Kernel::Point_3;
 using Surface = CGAL::Implicit_surface_3<Kernel, std::function<double(Point)>>;
 
-/// Points are rounded to the output's precision before they enter the triangulation, so that what is written
-/// is the very triangulation that the predicates judged.
+/// Points are rounded to the output's precision before they enter the triangulation, so that the output is
+/// exactly the triangulation that the predicates evaluated.
 Point rounded(double x, double y, double z) { return {double(float(x)), double(float(y)), double(float(z))}; }
 
 struct RoundNewPoints {
@@ -159,8 +159,8 @@ void refine(Mesher& mesher, const Triangulation& triangulation, const Extraction
   }
 }
 
-/// Whether the cell on this side of the facet is inside. An infinite cell has no side of its own and counts
-/// as the opposite of the cell beyond the facet.
+/// Returns true if the cell on this side of the facet is inside. An infinite cell has no side of its own and
+/// counts as the opposite of the cell beyond the facet.
 bool cell_inside(const Triangulation& triangulation, const Triangulation::Facet& facet, Field& field) {
   if (!triangulation.is_infinite(facet.first)) return field.side(triangulation.dual(facet.first)) < 0.0;
   return !(field.side(triangulation.dual(triangulation.mirror_facet(facet).first)) < 0.0);

@@ -7,7 +7,7 @@
 #include "reference/test_meshes.h"
 
 namespace hermesh {
-namespace {
+namespace cgal_surface_mesher_test {
 
 TEST(CgalSurfaceMesher, SphereIsClosedOutwardAndNearTheSurface) {
   const double voxel = 0.05;
@@ -77,5 +77,5 @@ TEST(IsosurfaceSeeds, LieOnTheSurfaceOfEveryComponent) {
   EXPECT_GE(large, 12);
 }
 
-}  // namespace
+}  // namespace cgal_surface_mesher_test
 }  // namespace hermesh

@@ -61,8 +61,8 @@ Foot foot_on_triangle(const Vector3d& p, const Corners& triangle) {
   return best;
 }
 
-/// A traversal that finds the nearest triangle: it enters every box that could hold something nearer than
-/// what was found so far.
+/// A traversal that finds the nearest triangle: it enters every box that could contain a point nearer than
+/// the nearest point found so far.
 struct Nearest {
   const DistanceOracle* oracle;
   const std::vector<Kernel::Triangle_3>* cgal;
@@ -264,8 +264,8 @@ void spread(const std::array<double, kBlockVoxels>& distance, int seed, bool sig
       for (const int step : {-1, 1}) {
         const int along = (i / stride) % 8 + step;
         const int j = i + step * stride;
-        // Two balls free of surface that overlap cover the edge between their centres, and that between the
-        // places of their sides.
+        // Two overlapping balls that contain no surface cover the edge between their centres, and the edge
+        // between the points that define their sides.
         if (along < 0 || along > 7 || known[std::size_t(j)] ||
             distance[std::size_t(i)] + distance[std::size_t(j)] <= 1.0 + kSure)
           continue;

@@ -1,6 +1,6 @@
-// What is nearest to a point, and on which side of a closed surface it lies: by a CGAL tree over the
-// triangles, in double precision. Slow, certain, and it shares no code with the voxelizers that are judged by
-// it.
+// Finds the nearest point of a surface and the side of a closed surface on which a point lies: by a CGAL tree
+// over the triangles, in double precision. Slow and reliable; it shares no code with the voxelizers that are
+// validated with it.
 #pragma once
 
 #include <Eigen/Core>
@@ -39,17 +39,17 @@ class DistanceOracle {
   /// fast.
   double distance(const Eigen::Vector3d& point,
                   double upper_bound = std::numeric_limits<double>::infinity()) const;
-  /// Whether a triangle comes within a radius of a point.
+  /// Returns true if a triangle comes within a radius of a point.
   bool any_within(const Eigen::Vector3d& point, double radius) const;
   /// The point of the triangles that is nearest to the given one.
   Eigen::Vector3d nearest_point(const Eigen::Vector3d& point) const;
   /// Numbers of all triangles within a radius of a point.
   std::vector<std::uint32_t> triangles_within(const Eigen::Vector3d& point, double radius) const;
 
-  /// How a set of rays from a point voted on whether it crosses the surface an odd number of times. A ray in
-  /// general position meets no edge, and its parity is right. The directions are irrational multiples of one
-  /// another; should a ray graze an edge even so, the others outvote it. Three rays that agree are enough; at
-  /// most nine are cast.
+  /// The votes of a set of rays from a point for an odd or even number of intersections with the surface. A
+  /// ray in general position meets no edge, and its parity is right. The directions are irrational multiples
+  /// of one another; should a ray graze an edge even so, the others outvote it. Three rays that agree are
+  /// enough; at most nine are cast.
   struct Vote {
     int odd = 0, cast = 0;
     bool inside() const { return 2 * odd > cast; }
@@ -84,9 +84,9 @@ inline Eigen::Vector3d block_position(const std::array<int, 3>& origin, int i) {
 std::array<double, kBlockVoxels> block_distances(const DistanceOracle& oracle,
                                                  const std::array<int, 3>& origin, double reach);
 
-/// The place that is asked for the side of sample i: a few millionths of a voxel above the sample on every
-/// axis, most on x and least on z, so that a sample on a polygon belongs to the solid on the upper side of
-/// it.
+/// The point at which the side of sample i is evaluated: a few millionths of a voxel above the sample on
+/// every axis, most on x and least on z, so that a sample on a polygon belongs to the solid on the upper side
+/// of it.
 Eigen::Vector3d block_side_place(const std::array<int, 3>& origin, int i);
 
 /// The samples of a block that lie inside. `is_inside` is called with block_side_place() of one sample of

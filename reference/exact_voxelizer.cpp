@@ -27,11 +27,11 @@ struct Band {
 
 /// Depth, in voxels, that a voxel inside gets if it lies on the surface, so that its value has a sign.
 constexpr double kLeastDepth = 0x1p-24;
-/// Longest and shortest edges, in voxels, of the pieces by which the solid's boundary is told from the sheets
-/// within it.
+/// Longest and shortest edges, in voxels, of the pieces by which the solid's boundary is distinguished from
+/// the sheets within it.
 constexpr double kLargest = 0.7, kFinest = 0.02;
 
-/// The surface that distances are taken to, and who says what is inside.
+/// The surface that distances are measured to, and the function that decides which points are inside.
 struct Solid {
   const DistanceOracle& boundary;
   std::function<bool(const Eigen::Vector3d&)> inside;
@@ -75,8 +75,8 @@ void fill(openvdb::FloatTree& grid, const Solid& solid, const std::vector<BlockO
   }
 }
 
-/// The triangles in pieces of at most kLargest, so that nothing passes between the places that
-/// solid_boundary() looks at.
+/// The triangles in pieces of at most kLargest, so that nothing passes between the points that
+/// solid_boundary() samples.
 std::vector<Corners> in_pieces(const std::vector<Corners>& triangles) {
   std::vector<Corners> pieces, todo = triangles;
   while (!todo.empty()) {

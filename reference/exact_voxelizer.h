@@ -23,7 +23,7 @@ namespace hermesh {
 /// the voxel between them. For a closed mesh that does not intersect itself this is the true inside, with any
 /// winding; nested shells alternate; for an open mesh it is a vote. Triangles of no area are skipped: their
 /// edges belong to their neighbours, too.
-/// @throws Error for what check_voxelization_fits() refuses, and for a mesh whose triangles all have no area;
+/// @throws Error if check_voxelization_fits() throws, and for a mesh whose triangles all have no area;
 /// Cancelled
 LevelSet exact_voxelizer(const VoxelizationInput& input);
 

@@ -5,7 +5,7 @@
 #include "reference/variants.h"
 
 namespace hermesh {
-namespace {
+namespace exact_voxelizer_test {
 
 /// Signed distance to an axis-aligned cube about the origin.
 double cube_distance(const Eigen::Vector3d& p, double half) {
@@ -103,5 +103,5 @@ TEST(ExactVoxelizer, OpenvdbAgreesNextToTheSurface) {
   EXPECT_LT(largest, 1.2);
 }
 
-}  // namespace
+}  // namespace exact_voxelizer_test
 }  // namespace hermesh

@@ -12,7 +12,7 @@ using openvdb::Coord;
 struct Crossing {
   Coord voxel;  ///< lower end of the edge
   int axis;
-  double offset;  ///< place on the edge, 0 to 1
+  double offset;  ///< position on the edge, 0 to 1
   std::size_t component = 0;
 
   openvdb::Vec3d point() const {

@@ -108,7 +108,7 @@ struct Tally {
     }
     const double error = std::abs(finding.value - truth);
     ++compared;
-    // A value that is no number is as wrong as can be.
+    // A value that is not a number counts as the worst error.
     const bool fine = error <= DistanceReport::kFine;
     if (std::isfinite(error)) {
       squares += error * error;
@@ -205,7 +205,7 @@ DistanceReport DistanceTruth::judge(const LevelSet& level_set, const Vector3d& o
                double(blocks_[i].distance[std::size_t(voxel)]));
         }
     });
-    // What is active outside of the blocks is farther away than the band is wide.
+    // Active voxels outside of the blocks are farther away than the band is wide.
     total.stray += std::int64_t(grid.activeVoxelCount()) - total.compared;
   }
   DistanceReport report;
@@ -226,8 +226,8 @@ DistanceReport DistanceTruth::judge(const LevelSet& level_set, const Vector3d& o
   return report;
 }
 
-/// Tells the findings apart by where their nearest point lies, and sorts them: those on the boundary first,
-/// and among these the worst first.
+/// Classifies the findings by the location of their nearest point, and sorts them: those on the boundary
+/// first, and among these the worst first.
 void DistanceTruth::classify(std::vector<VoxelFinding>& off, std::vector<VoxelFinding>& missing,
                              DistanceReport& report, const RunContext& context) const {
   constexpr std::size_t kMost = 20'000;

@@ -1,8 +1,8 @@
-// Judges a level set against its polygons: the distance in every voxel or in many of them, the set of active
-// voxels, and the signs. It takes the oracles' word alone and knows no voxelizer.
+// Validates a level set against its polygons: the distance in every voxel or in many of them, the set of
+// active voxels, and the signs. It relies only on the oracles and does not depend on any voxelizer.
 //
-// What is true depends on the mesh and the grid's spacing, not on who is judged: a truth is worked out once
-// and then compared with any number of level sets.
+// The true values depend on the mesh and the grid's spacing, not on the level set under test: they are
+// computed once and then compared with any number of level sets.
 #pragma once
 
 #include <array>
@@ -16,10 +16,10 @@ namespace hermesh {
 
 using VoxelIndex = std::array<int, 3>;
 
-/// The voxels that a judge looks at.
+/// The voxels that are validated.
 struct VoxelSelection {
   double band = 3.0;         ///< voxels from the surface, on both sides
-  std::int64_t samples = 0;  ///< 0: all voxels; else so many within the band, drawn evenly over the surface
+  std::int64_t samples = 0;  ///< 0: all voxels; else the number in the band, drawn evenly over the surface
   std::uint64_t seed = 1;    ///< seed of the draw
 };
 
@@ -29,7 +29,7 @@ struct VoxelFinding {
   double truth = 0.0;  ///< distance in voxels
   double value = 0.0;  ///< magnitude found, in voxels
   bool active = true;
-  bool bounds_solid = true;  ///< whether the nearest point lies on the solid's boundary
+  bool bounds_solid = true;  ///< true if the nearest point lies on the solid's boundary
 };
 
 struct DistanceReport {
@@ -37,10 +37,10 @@ struct DistanceReport {
   std::int64_t compared = 0;                             ///< active voxels
   double max = 0.0, rms = 0.0;                           ///< errors of magnitude over `compared`, in voxels
   std::int64_t fine = 0, coarse = 0;                     ///< voxels that are off by more than kFine, kCoarse
-  /// The voxels off by more than kFine, told apart: those whose nearest point lies on the solid's boundary,
-  /// and those whose nearest point lies on a sheet inside the solid, of which a level set of the solid is
-  /// free to know nothing; with the largest error of either kind. If there are more than 20,000, an even part
-  /// of them, with the worst, is told apart; `classified` says how many.
+  /// The voxels off by more than kFine, in two classes: those whose nearest point lies on the solid's
+  /// boundary, and those whose nearest point lies on a sheet inside the solid, which a level set of the solid
+  /// need not represent; with the largest error of either class. If there are more than 20,000, an even
+  /// subset of them that includes the worst is classified; `classified` is its size.
   std::int64_t classified = 0, on_boundary = 0, on_inner_sheet = 0;
   double on_boundary_max = 0.0, on_inner_sheet_max = 0.0;
   /// `stray` counts voxels that are active although kFine or more beyond the band's width; `missing` and
@@ -53,7 +53,7 @@ struct DistanceReport {
 /// True distances around a surface.
 class DistanceTruth {
  public:
-  /// Keeps references to both oracles; `solid` decides what the solid's boundary is. @throws Cancelled.
+  /// Stores references to both oracles; `solid` determines the solid's boundary. @throws Cancelled.
   DistanceTruth(const DistanceOracle& surface, const WindingOracle& solid, const VoxelSelection& selection,
                 const RunContext& context);
 
@@ -82,7 +82,7 @@ class DistanceTruth {
   std::vector<Sample> samples_;  ///< else the voxels that were drawn
 };
 
-/// The oracle that says on which side a voxel is.
+/// The oracle that decides on which side a voxel is.
 enum class SignOracle {
   kParity,           ///< rays vote: right for closed surfaces with any winding
   kUnanimousParity,  ///< rays vote, and voxels whose rays disagree are left out

@@ -8,7 +8,7 @@
 #include "reference/test_meshes.h"
 
 namespace hermesh {
-namespace {
+namespace level_set_judge_test {
 
 using Eigen::Vector3d;
 using openvdb::Coord;
@@ -278,5 +278,5 @@ TEST_F(Judge, RefusesSamplesThatLieElsewhere) {
   EXPECT_THROW(distances(moved), Error);
 }
 
-}  // namespace
+}  // namespace level_set_judge_test
 }  // namespace hermesh

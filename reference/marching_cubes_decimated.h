@@ -1,4 +1,4 @@
-// What most people do today for few triangles: marching cubes (ours), then quadric edge collapse (Garland &
+// The most common approach to few triangles: marching cubes (ours), then quadric edge collapse (Garland &
 // Heckbert 1997) by OpenMesh, sequentially.
 #pragma once
 

@@ -8,7 +8,7 @@
 #include "reference/test_meshes.h"
 
 namespace hermesh {
-namespace {
+namespace marching_cubes_decimated_test {
 
 LevelSet sphere_level_set() { return test::voxelize("openvdb", test::sphere(1.0, 5), 0.05); }
 
@@ -58,5 +58,5 @@ TEST(Decimate, RefusesWhatIsNotManifold) {
   EXPECT_THROW(decimate(mesh, 4, 180.0, context), Error);
 }
 
-}  // namespace
+}  // namespace marching_cubes_decimated_test
 }  // namespace hermesh

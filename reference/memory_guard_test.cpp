@@ -1,4 +1,5 @@
-// The guard in front of every voxelizer, and its estimate against what the exact voxelizer allocates.
+// The memory check that precedes every voxelizer, and its estimate compared with the allocations of the exact
+// voxelizer.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -9,7 +10,7 @@
 #include "reference/variants.h"
 
 namespace hermesh {
-namespace {
+namespace memory_guard_test {
 
 const double kInfinity = std::numeric_limits<double>::infinity(), kNan = std::nan("");
 
@@ -96,5 +97,5 @@ TEST(MemoryEstimate, AvailableMemoryIsKnownHere) {
   EXPECT_GT(*available, std::uint64_t(1) << 24);
 }
 
-}  // namespace
+}  // namespace memory_guard_test
 }  // namespace hermesh

@@ -1,4 +1,5 @@
-// What the references ask of a grid before they mesh it. Heavy (OpenVDB): for .cpp files.
+// The checks and properties of a grid that the references require before they mesh it. Heavy (OpenVDB): for
+// .cpp files.
 #pragma once
 
 #include "algorithms/core/openvdb_trees.h"
@@ -12,8 +13,8 @@ namespace hermesh {
 struct MeshingFrame {
   Eigen::Vector3d origin = Eigen::Vector3d::Zero();  ///< choose_origin() of the box of the active voxels
   openvdb::math::Transform::Ptr transform;
-  /// Whether samples above the isovalue are inside. As for our own extractors, inside is below the isovalue
-  /// except in a volume that is no level set and whose background is below the isovalue, such as fog.
+  /// True if samples above the isovalue are inside. As for our own extractors, inside is below the isovalue
+  /// except in a volume that is not a level set and whose background is below the isovalue, such as fog.
   bool inside_is_above = false;
 };
 

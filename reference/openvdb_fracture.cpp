@@ -7,7 +7,7 @@
 #include <utility>
 
 #include "algorithms/core/level_set_grid.h"
-#include "algorithms/core/stopwatch.h"
+#include "algorithms/core/run_context.h"
 #include "reference/meshing_frame.h"
 #include "reference/openvdb_mesh_to_volume.h"
 #include "reference/openvdb_mesher.h"

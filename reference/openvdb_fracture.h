@@ -18,7 +18,7 @@ struct OpenvdbFragment {
   PolygonMesh
       mesh;  ///< has the polygon attribute `surface`: 1 where OpenVDB does not flag the polygon as exterior
   double conversion_seconds = 0.0, csg_seconds = 0.0, extraction_seconds = 0.0;
-  std::optional<std::size_t> cutter = {};  ///< the cutter that took the fragment; nothing for what is left
+  std::optional<std::size_t> cutter = {};  ///< the cutter that took the fragment; none for the remainder
 };
 
 /// A function that makes cutter k, with the object's origin and unit of length. It is called once for each
@@ -26,9 +26,9 @@ struct OpenvdbFragment {
 using OpenvdbCutter = std::function<PolygonMesh(std::size_t)>;
 
 /// Breaks the object by one cutter after the other: each is voxelized by openvdb_mesh_to_volume() on the
-/// object's lattice and takes its share of what is left. Fragments are meshed at the end with `adaptivity` 0
-/// to 1 and all have the object's origin. A cutter without polygons is passed over. @throws Error for a
-/// lattice that is turned or scaled unevenly; Cancelled.
+/// object's lattice and takes its share of the remainder. Fragments are meshed at the end with `adaptivity` 0
+/// to 1 and all have the object's origin. A cutter without polygons is skipped. @throws Error for a lattice
+/// that is rotated or scaled unevenly; Cancelled.
 void openvdb_fracture(const LevelSet& object, std::size_t cutters, const OpenvdbCutter& cutter,
                       double adaptivity, const std::function<void(OpenvdbFragment&&)>& hand_over,
                       RunContext& context);

@@ -29,7 +29,7 @@ class Polygons {
   double voxel_size_;
 };
 
-/// What OpenVDB asks, from any thread, whether to stop.
+/// The interrupter that OpenVDB polls from any thread.
 struct Interrupter {
   const RunContext& context;
   void start(const char* = nullptr) {}
@@ -37,8 +37,8 @@ struct Interrupter {
   bool wasInterrupted(int = -1) const { return context.cancelled(); }
 };
 
-/// Whether more than 1 % of the active voxels are negative. A few negative ones are no inside: an open mesh
-/// leaves some where it passes exactly through samples.
+/// Returns true if more than 1 % of the active voxels are negative. A few negative voxels do not count as an
+/// inside: an open mesh leaves some where it passes exactly through samples.
 bool has_inside(const openvdb::FloatGrid& grid) {
   std::size_t active = 0, negative = 0;
   for (auto leaf = grid.tree().cbeginLeaf(); leaf; ++leaf)

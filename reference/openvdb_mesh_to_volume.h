@@ -8,9 +8,9 @@ namespace hermesh {
 
 /// Voxelizes by meshToVolume with default flags: the grid "sdf" of class level set. OpenVDB renormalises the
 /// distances, so they are approximate everywhere. Signs do not depend on the winding; cavities are filled; an
-/// open mesh comes out without an inside, and a note says so. Values outside of the band are exterior_band
+/// open mesh comes out without an inside, which a note reports. Values outside of the band are exterior_band
 /// and −interior_band voxels in world units.
-/// @throws Error for what check_voxelization_fits() refuses; Cancelled
+/// @throws Error if check_voxelization_fits() throws; Cancelled
 LevelSet openvdb_mesh_to_volume(const VoxelizationInput& input);
 
 }  // namespace hermesh

@@ -12,7 +12,7 @@
 #include "reference/variants.h"
 
 namespace hermesh {
-namespace {
+namespace openvdb_test {
 
 const double kSphereVolume = 4.0 / 3.0 * std::numbers::pi;
 
@@ -155,5 +155,5 @@ TEST(ReferenceVariants, AllStopWhenCancelled) {
   }
 }
 
-}  // namespace
+}  // namespace openvdb_test
 }  // namespace hermesh

@@ -12,7 +12,7 @@ PolygonMesh openvdb_volume_to_mesh(const ExtractionInput& input) {
   const MeshingFrame frame = meshing_frame(grid, input.isovalue);
 
   // OpenVDB takes the inside of a level set to be below the isovalue and that of any other grid to be above
-  // it, so the copy, which shares the tree with the original, says what the inside is.
+  // it, so the grid class of the copy, which shares the tree with the original, selects the inside.
   openvdb::MetaMap meta;
   meta.insertMeta(openvdb::GridBase::META_GRID_CLASS,
                   openvdb::StringMetadata(openvdb::GridBase::gridClassToString(

@@ -7,10 +7,10 @@
 
 namespace hermesh {
 
-/// Extracts by VolumeToMesh. Option: `adaptivity`, 0 to 1. Inside is what MeshingFrame says, whatever OpenVDB
-/// would make of the grid's class. Points are relative to choose_origin() of the box of active voxels. The
-/// work cannot be interrupted while it runs; cancellation is seen before and after. @throws Cancelled; Error
-/// for a volume with values that are not finite
+/// Extracts by VolumeToMesh. Option: `adaptivity`, 0 to 1. The inside is that of MeshingFrame, regardless of
+/// OpenVDB's interpretation of the grid's class. Points are relative to choose_origin() of the box of active
+/// voxels. The work cannot be interrupted while it runs; cancellation is checked before and after. @throws
+/// Cancelled; Error for a volume with values that are not finite.
 PolygonMesh openvdb_volume_to_mesh(const ExtractionInput& input);
 
 }  // namespace hermesh

@@ -78,8 +78,8 @@ struct Machinery {
   const PseudoNormals& normals;
   double exterior, interior, voxel_size;
 
-  /// A place's vector from its nearest point on the surface, and whether the pseudo-normal there points away
-  /// from it.
+  /// The vector from a point's nearest point on the surface to the point, and its side: inside if the
+  /// pseudo-normal there points away from the point.
   struct Side {
     Vector3d away;
     bool inside;
@@ -113,8 +113,8 @@ struct Machinery {
     return any ? std::move(result) : nullptr;
   }
 
-  /// No surface passes through a tile, so that its centre speaks for it. What lies beyond the polygons' box
-  /// is outside.
+  /// No surface passes through a tile, so the sign at its centre holds for all of it. Tiles beyond the
+  /// polygons' box are outside.
   void sign_tiles(openvdb::FloatTree& grid, float outside, float inside) const {
     Vector3d low = tree.corner(0, 0), high = low;
     for (std::uint32_t t = 0; t < tree.triangle_count(); ++t)

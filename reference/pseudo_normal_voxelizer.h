@@ -1,6 +1,6 @@
-// The voxelizer that the thesis set out from (Aldén 2011, chapter 5): signs from angle-weighted
+// The voxelizer that the thesis started from (Aldén 2011, chapter 5): signs from angle-weighted
 // pseudo-normals (Bærentzen and Aanæs, Signed Distance Computation Using the Angle Weighted Pseudonormal,
-// TVCG 2005), in place of a flood.
+// TVCG 2005), instead of a flood fill.
 #pragma once
 
 #include <Eigen/Core>
@@ -29,14 +29,14 @@ NearestPart nearest_part(const Eigen::Vector3d& p, const std::array<Eigen::Vecto
 ///   - that of a corner the sum of the unit normals of all faces there, each times its angle at the corner.
 /// Where a mesh is closed, oriented and free of self-intersection the vector from a surface's nearest point
 /// to any point outside makes an acute angle with the normal of the part that the nearest point lies on, and
-/// an obtuse one inside; where it is not, the normal is a sum all the same and says what it says.
+/// an obtuse one inside; otherwise the normal is the same sum, but without this guarantee.
 class PseudoNormals {
  public:
   PseudoNormals(const std::vector<Eigen::Vector3f>& points, const std::vector<Triangle>& triangles);
   Eigen::Vector3d of(std::uint32_t triangle, TrianglePart part) const;
 
  private:
-  std::vector<Triangle> welded_;  ///< corners as numbers of places
+  std::vector<Triangle> welded_;  ///< corners as indices of positions
   std::vector<Eigen::Vector3d> faces_, corners_;
   struct Edge {
     std::uint32_t low, high;
@@ -45,12 +45,11 @@ class PseudoNormals {
   std::vector<Edge> edges_;  ///< in the order of their ends
 };
 
-/// The grid "sdf" of class level set: in each voxel the distance to the nearest triangle, exact but for
-/// rounding, with the sign that the pseudo-normal of its nearest part gives; negative inside. Active are the
-/// voxels nearer than the band of their side. Right
-/// for closed, oriented polygons that do not meet one another; for others it is what the method makes of
-/// them. The bytes do not depend on the number of threads.
-/// @throws Error for what check_voxelization_fits() refuses, and for a mesh whose triangles all have no area;
+/// The grid "sdf" of class level set: in each voxel the distance to the nearest triangle, exact except
+/// for rounding, with the sign that the pseudo-normal of its nearest part gives; negative inside. The voxels
+/// nearer than the band of their side are active. The signs are correct for closed, oriented polygons without
+/// self-intersection and unspecified for others. The bytes do not depend on the number of threads.
+/// @throws Error if check_voxelization_fits() throws, and for a mesh whose triangles all have no area;
 /// Cancelled
 LevelSet pseudo_normal_voxelizer(const VoxelizationInput& input);
 

@@ -11,7 +11,7 @@
 #include "reference/variants.h"
 
 namespace hermesh {
-namespace {
+namespace pseudo_normal_voxelizer_test {
 
 using Eigen::Vector3d;
 
@@ -132,5 +132,5 @@ TEST(PseudoNormalVoxelizer, RefusesAMeshWithoutArea) {
   EXPECT_THROW(test::voxelize("pseudo-normals", flat, 0.1), Error);
 }
 
-}  // namespace
+}  // namespace pseudo_normal_voxelizer_test
 }  // namespace hermesh

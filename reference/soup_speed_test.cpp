@@ -12,11 +12,11 @@
 #include "reference/test_soups.h"
 
 namespace hermesh {
-namespace {
+namespace soup_speed_test {
 
 using test::Soup;
 
-/// Processor time that f() takes in all threads of this process; what other processes do does not count.
+/// Returns the processor time of f() in all threads of this process, without that of other processes.
 template <class F>
 double processor_seconds(F&& f) {
   const auto now = [] {
@@ -60,5 +60,5 @@ TEST(Slow, TwoHundredSoupsTakeNoMoreThanTwentyTimesWhatOpenVDBTakes) {
   std::printf("worst: %.1f times, %s\n", worst, worst_name.c_str());
 }
 
-}  // namespace
+}  // namespace soup_speed_test
 }  // namespace hermesh

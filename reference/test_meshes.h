@@ -1,4 +1,4 @@
-// Small meshes with known geometry, and what the tests of this folder ask of a mesh.
+// Small meshes with known geometry, and mesh checks for the tests of this directory.
 #pragma once
 
 #include <map>
@@ -23,8 +23,8 @@ PolygonMesh joined(const PolygonMesh& first, const PolygonMesh& second);
 PolygonMesh reversed(PolygonMesh mesh);
 
 double signed_volume(const PolygonMesh& mesh);
-/// Whether every directed edge is there exactly once, and its opposite exactly once: then the mesh is closed,
-/// edge-manifold and oriented.
+/// Returns true if every directed edge occurs exactly once, and its opposite exactly once: then the mesh is
+/// closed, edge-manifold and oriented.
 bool closed_and_oriented(const PolygonMesh& mesh);
 /// The number of points that polygons use, less that of edges, plus that of triangles.
 long euler_characteristic(const PolygonMesh& mesh);

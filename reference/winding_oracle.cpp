@@ -67,8 +67,8 @@ std::vector<DirectedEdge> boundary_of(const std::vector<Corners>& triangles) {
   return boundary;
 }
 
-/// Whether the volume of the cone from an apex to the triangles is negative for every apex in the box. The
-/// volume is linear in the apex, so the box's corners tell.
+/// Returns true if the volume of the cone from an apex to the triangles is negative for every apex in the
+/// box. The volume is linear in the apex, so it suffices to test the box's corners.
 bool is_inside_out(const std::vector<Corners>& triangles, const Vector3d& lower, const Vector3d& upper) {
   bool negative = true;
   for (int i = 0; i < 8; ++i) {

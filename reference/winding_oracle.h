@@ -26,16 +26,16 @@ class WindingOracle {
   /// is, if its volume is negative about every point of its box. The volume of an open soup depends on that
   /// point; if even the sign of the volume does, as for a sheet, the winding is taken as it was given.
   double operator()(const Eigen::Vector3d& point) const;
-  /// Whether the winding number is above one half.
+  /// Returns true if the winding number is above one half.
   bool inside(const Eigen::Vector3d& point) const { return (*this)(point) > 0.5; }
 
-  /// Whether a triangle of the surface bounds the solid at a point on it: whether the places 1e-3 voxel off
-  /// on its two sides differ in being inside.
+  /// Returns true if a triangle of the surface bounds the solid at a point on it: one of the two points 1e-3
+  /// voxel off on its two sides is inside and the other outside.
   bool differs_across(const Corners& triangle, const Eigen::Vector3d& on_triangle) const;
 
-  /// Whether a point of the surface bounds the solid: one side of it is inside and the other outside. Both
-  /// sides of every triangle that has the point are looked at, a little way into the triangle and 1e-3 voxel
-  /// (less where the triangle is smaller) off its plane.
+  /// Returns true if a point of the surface bounds the solid: one side of it is inside and the other outside.
+  /// Both sides of every triangle that contains the point are tested, at a short distance into the triangle
+  /// and 1e-3 voxel (less where the triangle is smaller) off its plane.
   bool bounds_solid(const DistanceOracle& surface, const Eigen::Vector3d& on_surface) const;
 
  private:

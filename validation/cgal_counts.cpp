@@ -15,7 +15,7 @@ namespace {
 
 namespace PMP = CGAL::Polygon_mesh_processing;
 
-// Nothing here asks a predicate, so plain doubles do.
+// Plain doubles suffice, because no predicate is evaluated.
 using Kernel = CGAL::Simple_cartesian<double>;
 using Mesh = CGAL::Surface_mesh<Kernel::Point_3>;
 using Polygon = boost::container::small_vector<std::size_t, 4>;
@@ -38,7 +38,7 @@ std::vector<Kernel::Point_3> shifted_points(const MeshFile& file, const Eigen::V
   return points;
 }
 
-// CGAL's test of a soup says no without a place. Adding polygon after polygon finds one.
+// Finds the position of a defect by adding polygon after polygon, because CGAL's test of a soup reports none.
 std::string refusal_with_place(const MeshFile& file, double unit) {
   Mesh mesh;
   for (std::size_t p = 0; p < file.points.size(); ++p) mesh.add_vertex(Kernel::Point_3(0, 0, 0));
@@ -61,7 +61,7 @@ std::string refusal_with_place(const MeshFile& file, double unit) {
          describe_point(unit * file.points[std::size_t(target(singular.front(), mesh))]) + ".";
 }
 
-// A halfedge of a polygon that ends where the fan starts that cuts it: anywhere in a triangle.
+// Returns a halfedge of a polygon that ends at the apex of the fan that cuts it.
 Mesh::Halfedge_index fan_start(const Mesh& mesh, const MeshFile& file, Mesh::Face_index f) {
   const std::size_t polygon = std::size_t(f);
   const auto first = mesh.halfedge(f);

@@ -3,26 +3,141 @@
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
 
-#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <numbers>
-#include <numeric>
+#include <optional>
 
 #include "validation/geometry/distance.h"
-#include "validation/geometry/welded_surface.h"
 
 namespace hermesh::validation {
 namespace {
 
 constexpr double kDegree = std::numbers::pi / 180.0;
-// A hexagonal prism (60°) has edges, an octagonal one (45°) is a cylinder in coarse steps; between the two a
-// line has to be drawn.
+// Between a hexagonal prism (60°), which has edges, and an octagonal one (45°), a cylinder in coarse steps.
 constexpr double kMostBlendTurning = 50.0 * kDegree;
 constexpr double kSubstantial = 1.0 / 3.0;
 constexpr double kMostWidthRatio = 3.0;
 constexpr double kEndOfRow = 0.9;
 constexpr double kLeastParallel = 0.70710678;  // cos 45°
+
+// A surface of triangles with welded points, without triangles of no area.
+class WeldedSurface {
+ public:
+  struct Edge {
+    std::array<std::uint32_t, 2> points, triangles;
+    // The angle between the normals of the two triangles, in radians, positive where the surface is convex;
+    // 0 ≤ |turning| ≤ π.
+    double turning;
+  };
+
+  explicit WeldedSurface(const TriangleSoup& soup) {
+    MeshFile mesh = welded_triangles(soup);
+    points_ = std::move(mesh.points);
+    triangles_ = std::move(mesh.triangles);
+    edge_of_.assign(triangles_.size(), {kNoEdge, kNoEdge, kNoEdge});
+    for_each_edge(sorted_sides(triangles_), [&](std::span<const TriangleSide> sides) {
+      if (sides.size() != 2) return;
+      Edge edge{{sides[0].low, sides[0].high}, {sides[0].triangle, sides[1].triangle}, 0.0};
+      edge.turning = turning(edge);
+      for (const TriangleSide& side : sides)
+        edge_of_[side.triangle][side.corner] = std::uint32_t(edges_.size());
+      edges_.push_back(edge);
+    });
+  }
+
+  // Returns the edges in which exactly two triangles meet, by their points in increasing order.
+  const std::vector<Edge>& edges() const { return edges_; }
+  const Eigen::Vector3d& point(std::uint32_t p) const { return points_[p]; }
+  Eigen::Vector3d direction(const Edge& e) const {
+    return (points_[e.points[1]] - points_[e.points[0]]).normalized();
+  }
+
+  struct Arrival {
+    std::size_t edge;
+    double distance;
+  };
+  // Walks from a point near the middle of an edge into its first or second triangle (`side` 0 or 1), at right
+  // angles to the edge and straight on over the unfolded surface, across edges that turn by less than
+  // `least_turning`. Returns the first edge that turns by more; nothing at a border, beyond `farthest`, or
+  // once the walk has crossed as many triangles as there are.
+  std::optional<Arrival> walk(std::size_t edge, int side, double least_turning, double farthest) const;
+
+ private:
+  static constexpr std::uint32_t kNoEdge = ~std::uint32_t(0);
+
+  double turning(const Edge& e) const;
+  Eigen::Vector3d normal(std::uint32_t triangle) const {
+    const Triangle& t = triangles_[triangle];
+    return area_vector({points_[t[0]], points_[t[1]], points_[t[2]]}).normalized();
+  }
+
+  std::vector<Eigen::Vector3d> points_;
+  std::vector<Triangle> triangles_;
+  std::vector<Edge> edges_;
+  std::vector<std::array<std::uint32_t, 3>>
+      edge_of_;  // of each triangle's side k to k + 1; kNoEdge at a border
+};
+
+double WeldedSurface::turning(const Edge& e) const {
+  const auto runs_along = [&](const Triangle& t) {
+    for (int k = 0; k < 3; ++k)
+      if (t[k] == e.points[0] && t[(k + 1) % 3] == e.points[1]) return true;
+    return false;
+  };
+  const bool first_along = runs_along(triangles_[e.triangles[0]]);
+  const bool second_along = runs_along(triangles_[e.triangles[1]]);
+  const Eigen::Vector3d first = normal(e.triangles[0]);
+  // If both run in the same direction, one of them is flipped.
+  const Eigen::Vector3d second = (first_along == second_along ? -1.0 : 1.0) * normal(e.triangles[1]);
+  const Eigen::Vector3d along = (first_along ? 1.0 : -1.0) * direction(e);
+  return std::atan2(first.cross(second).dot(along), first.dot(second));
+}
+
+std::optional<WeldedSurface::Arrival> WeldedSurface::walk(std::size_t start, int side, double least_turning,
+                                                          double farthest) const {
+  // Off the middle, so that the walk does not pass through the vertices of a regular grid.
+  constexpr double kStart = 0.4567;
+  const Edge& from = edges_[start];
+  Eigen::Vector3d position = (1.0 - kStart) * points_[from.points[0]] + kStart * points_[from.points[1]];
+  Eigen::Vector3d along = direction(from);
+  double cosine = 0.0, sine = 1.0;  // of the heading: along the edge that is crossed, and into the triangle
+  std::size_t edge = start;
+  std::uint32_t triangle = from.triangles[side];
+  double distance = 0.0;
+  for (std::size_t steps = 0; steps < triangles_.size() && distance < farthest; ++steps) {
+    // The heading in this triangle's plane.
+    const Triangle& t = triangles_[triangle];
+    int entry = 0;
+    while (edge_of_[triangle][entry] != edge) ++entry;
+    const Eigen::Vector3d apex = points_[t[(entry + 2) % 3]] - points_[t[entry]];
+    const Eigen::Vector3d inward = (apex - apex.dot(along) * along).normalized();
+    const Eigen::Vector3d heading = cosine * along + sine * inward;
+    // Leave through the nearer of the two other sides.
+    double reach = std::numeric_limits<double>::infinity();
+    int exit = -1;
+    for (int k : {(entry + 1) % 3, (entry + 2) % 3}) {
+      const Eigen::Vector3d base = points_[t[k]], span = points_[t[(k + 1) % 3]] - base;
+      const Eigen::Vector3d outward = span.cross(normal(triangle));
+      const double speed = outward.dot(heading);
+      const double s = speed > 0.0 ? std::max(0.0, outward.dot(base - position) / speed)
+                                   : std::numeric_limits<double>::infinity();
+      if (s < reach) reach = s, exit = k;
+    }
+    if (exit < 0) return std::nullopt;
+    position += reach * heading;
+    distance += reach;
+    edge = edge_of_[triangle][exit];
+    if (edge == kNoEdge) return std::nullopt;
+    const Edge& crossed = edges_[edge];
+    if (std::abs(crossed.turning) >= least_turning) return Arrival{edge, distance};
+    along = direction(crossed);
+    cosine = heading.dot(along);
+    sine = std::sqrt(std::max(0.0, 1.0 - cosine * cosine));
+    triangle = crossed.triangles[crossed.triangles[0] == triangle ? 1 : 0];
+  }
+  return std::nullopt;
+}
 
 class BlendFinder {
  public:
@@ -82,14 +197,7 @@ class BlendFinder {
   std::vector<std::uint8_t> excluded_;
 };
 
-double diagonal_of(const TriangleSoup& soup) {
-  Box box;
-  for (const Triangle& t : soup.triangles)
-    for (std::uint32_t p : t) box.add(soup.points[p]);
-  return box.diagonal();
-}
-
-// A kept edge at one of its ends, looking away from it; or an excluded one.
+// A sharp or excluded edge at one of its ends, with the direction away from that end.
 struct EdgeEnd {
   std::uint32_t point;
   bool excluded;
@@ -118,7 +226,7 @@ std::vector<Eigen::Vector3d> find_corners(const WeldedSurface& surface, std::vec
 SharpFeatures find_sharp_features(const TriangleSoup& reference, double dihedral_degrees) {
   const double dihedral = dihedral_degrees * kDegree;
   const WeldedSurface surface(reference);
-  BlendFinder blends(surface, dihedral, diagonal_of(reference));
+  BlendFinder blends(surface, dihedral, reference.box().diagonal());
   blends.find();
   SharpFeatures features;
   std::vector<EdgeEnd> ends;
@@ -140,7 +248,7 @@ FeatureDistances feature_distances(const TriangleSoup& reference, const Triangle
                                    double dihedral_degrees, RunContext& context) {
   const SharpFeatures features = find_sharp_features(reference, dihedral_degrees);
   context.check();
-  const double spacing = diagonal_of(reference) / 4000.0;
+  const double spacing = reference.box().diagonal() / 4000.0;
   FeatureDistances result;
   result.edges = std::int64_t(features.edges.size());
   result.corners = std::int64_t(features.corners.size());
@@ -150,7 +258,7 @@ FeatureDistances feature_distances(const TriangleSoup& reference, const Triangle
     const double length = (b - a).norm();
     result.edge_length += length;
     const double pieces = std::max(4.0, std::ceil(length / spacing));
-    // Points of no weight: the ends count for the maximum alone.
+    // The ends have no weight: they count only for the maximum.
     samples.push_back({a, 0.0});
     for (double i = 0.5; i < pieces; i += 1.0)
       samples.push_back({a + (i / pieces) * (b - a), length / pieces});

@@ -9,7 +9,7 @@
 #include "validation/geometry/test_meshes.h"
 
 namespace hermesh::validation {
-namespace {
+namespace features_test {
 
 using namespace test;
 
@@ -88,10 +88,7 @@ TEST(Features, CoarseCylindersKeepTheirRimsOnly) {
 }
 
 TEST(Features, HollowCylinderTurnsTheOtherWay) {
-  MeshFile inside_out = prism(16);
-  for (Triangle& t : inside_out.triangles) std::swap(t[0], t[1]);
-  for (Quad& q : inside_out.quads) std::swap(q[0], q[2]);
-  const SharpFeatures f = features(inside_out, 10.0);
+  const SharpFeatures f = features(reversed(prism(16)), 10.0);
   EXPECT_EQ(f.edges.size(), 32u);
   EXPECT_EQ(f.edges_excluded, 16);
 }
@@ -158,7 +155,7 @@ TEST(Features, DistancesOfKnownCubes) {
   // Over the last h of an edge at both ends the distance is √(2h² + t²), t from 0 to h.
   const double end = 0.5 * h * h * (std::sqrt(3.0) + 2.0 * std::asinh(1.0 / std::sqrt(2.0)));
   EXPECT_NEAR(f.edge_to_mesh.mean, ((2.0 - 2.0 * h) * h * std::sqrt(2.0) + 2.0 * end) / 2.0, 1e-6);
-  // Rounding an edge off is what the measure is there to see.
+  // The measure must detect a rounded edge.
   EXPECT_GT(
       distances(extrusion({{-2, -2}, {2, -2}, {2, 2}, {-2, 2}}, 3.0), rounded_box(8), 30.0).edge_to_mesh.mean,
       0.1);
@@ -172,5 +169,5 @@ TEST(Features, NoneOnAFlatOrSmoothSurface) {
   EXPECT_EQ(f.edge_to_mesh.max, 0.0);
 }
 
-}  // namespace
+}  // namespace features_test
 }  // namespace hermesh::validation

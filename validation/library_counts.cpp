@@ -19,7 +19,7 @@ bool fits_half_edges(const MeshFile& mesh, const MeshReport& ours) {
 template <class Number>
 void expect_equal(const std::string& what, Number theirs, Number ours, double tolerance,
                   LibraryCounts& counts) {
-  // Not for numbers of which one is none.
+  // NaN is never equal.
   if (std::abs(double(theirs) - double(ours)) <= tolerance) return;
   std::ostringstream sentence;
   sentence.precision(12);

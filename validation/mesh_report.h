@@ -1,5 +1,4 @@
-// What the judges say of a mesh: counts, the places of the first offenders, and sentences; never a bare
-// "valid".
+// The validation report of a mesh: counts, the positions of the first defects of each kind, and sentences.
 #pragma once
 
 #include <Eigen/Core>
@@ -14,29 +13,40 @@
 
 namespace hermesh::validation {
 
-/// The first offenders of one kind: where they are (world units) and which polygons they are. Polygons are
+inline constexpr std::size_t kMaxPlaces = 10;
+/// The first defects of one kind, in an order that does not depend on the number of threads. Polygons are
 /// numbered triangles first, then quads.
 struct Places {
-  std::vector<Eigen::Vector3d> points;                ///< at most kMaxPlaces
-  std::vector<std::array<std::int64_t, 2>> polygons;  ///< the second is −1 where there is only one
-};
-inline constexpr std::size_t kMaxPlaces = 10;
+  std::vector<Eigen::Vector3d> points;                ///< world units; at most kMaxPlaces
+  std::vector<std::array<std::int64_t, 2>> polygons;  ///< the second is −1 if there is only one
 
-/// A judge's answer that may be missing, because a library cannot load such a mesh; then `refusal` says why.
+  /// Adds a defect unless there are kMaxPlaces already.
+  void add(const Eigen::Vector3d& point, std::int64_t first, std::int64_t second = -1) {
+    if (points.size() >= kMaxPlaces) return;
+    points.push_back(point);
+    polygons.push_back({first, second});
+  }
+  /// Appends the defects of `later`, up to kMaxPlaces in all.
+  void append(const Places& later) {
+    for (std::size_t i = 0; i < later.points.size(); ++i)
+      add(later.points[i], later.polygons[i][0], later.polygons[i][1]);
+  }
+};
+
+/// Counts by another library, or the reason why it cannot load the mesh.
 struct LibraryCounts {
   std::string library;  ///< "OpenMesh" or "CGAL"
   bool loaded = false;
-  std::string refusal;  ///< one sentence, with the place, when not loaded
+  std::string refusal;  ///< one sentence, with the position, if not loaded
   std::int64_t boundary_edges = 0, components = 0, euler_characteristic = 0;
   double volume = 0.0, area = 0.0;
-  std::vector<std::string>
-      disagreements;  ///< one sentence for each count that is not ours; empty = agreement
+  std::vector<std::string> disagreements;  ///< one sentence for each count that differs from ours
 };
 
 struct SelfIntersections {
   std::int64_t pairs = 0;           ///< pairs of triangles, all kinds
-  std::int64_t disjoint = 0;        ///< pairs that share no point
-  std::int64_t vertex_sharing = 0;  ///< pairs that share one corner and meet elsewhere, too
+  std::int64_t disjoint = 0;        ///< pairs that share no vertex
+  std::int64_t vertex_sharing = 0;  ///< pairs that share one vertex and intersect elsewhere
   std::int64_t edge_sharing = 0;    ///< pairs that share an edge and fold onto one another (coplanar overlap)
   Places places;
 };
@@ -61,8 +71,8 @@ struct HausdorffBound {
 struct FeatureDistances {
   std::int64_t edges = 0, corners = 0;     ///< sharp edges and corners found on the reference
   std::int64_t edges_excluded = 0;         ///< edges over the dihedral angle that are part of a smooth blend
-  double edge_length = 0.0;                ///< length of the edges kept, world units
-  Distances edge_to_mesh, corner_to_mesh;  ///< from the reference's features to the judged mesh
+  double edge_length = 0.0;                ///< length of the edges that count, world units
+  Distances edge_to_mesh, corner_to_mesh;  ///< from the reference's features to the mesh
 };
 
 /// A volume or an area found by sampling, with the ends of its interval (solid_comparison.h).
@@ -74,47 +84,43 @@ struct Estimate {
 struct SolidComparison {
   enum class Verdict { same, differs, unknown };
   Verdict verdict = Verdict::unknown;
-  Estimate mesh_volume, reference_volume;  ///< volume of what is inside for certain
+  Estimate mesh_volume, reference_volume;  ///< volumes that are certainly inside
   Estimate difference;      ///< volume of the symmetric difference; the upper end includes `unknown_volume`
-  Estimate unknown_volume;  ///< volume of what is neither inside nor outside for certain
+  Estimate unknown_volume;  ///< volume that is neither certainly inside nor certainly outside
   Estimate unexplained;     ///< the part of `difference` beyond `explained` from either boundary
-  double mesh_area = 0.0, reference_area = 0.0;  ///< areas of the mesh, and of what bounds the reference
-  double possible_area =
-      0.0;  ///< area of the reference's polygons that bound it by one rule and not by another
+  double mesh_area = 0.0, reference_area = 0.0;  ///< of the mesh and of the reference's boundary
+  double possible_area = 0.0;  ///< of the reference's polygons that bound it by one rule but not by another
   std::int64_t mesh_components = 0, reference_components = 0;  ///< components of these two surfaces
   Estimate false_area, lost_area;  ///< area of the mesh, of the reference, beyond `explained` from the other
   double explained = 0.0;          ///< the distance that discretisation explains
   std::int64_t samples = 0;
-  std::optional<Eigen::Vector3d> false_place, lost_place,
-      unexplained_place;  ///< the first sample of each kind
+  std::optional<Eigen::Vector3d> false_place, lost_place, unexplained_place;  ///< first sample of each kind
   bool reference_closed = true, reference_oriented = true;
 };
 
-/// The verdict as a word: "same", "differs" or "unknown".
+/// Returns "same", "differs" or "unknown".
 inline std::string verdict_word(const SolidComparison& solid) {
   using Verdict = SolidComparison::Verdict;
   return solid.verdict == Verdict::same ? "same" : solid.verdict == Verdict::differs ? "differs" : "unknown";
 }
 
-/// How much of the visible surface of a model a mesh does not show (visible_loss.h). Shares with their 95 %
-/// intervals.
+/// The visible surface of a model that is missing from a mesh (visible_loss.h): shares with 95 % intervals.
 struct VisibleLoss {
-  Estimate lost, vanished,
-      filled;         ///< shares of the visible area of the model; lost is the sum of the other two
-  Estimate invented;  ///< share of the mesh's area
+  Estimate lost, vanished, filled;  ///< of the visible area of the model; lost = vanished + filled
+  Estimate invented;                ///< of the mesh's area
   double visible_area = 0.0, invented_area = 0.0;        ///< world units²
-  std::optional<Eigen::Vector3d> place, invented_place;  ///< the first sample that vanished, that is invented
+  std::optional<Eigen::Vector3d> place, invented_place;  ///< first vanished, first invented sample
   std::int64_t samples = 0;                              ///< on each surface
 };
 
 struct MeshReport {
-  // Counts over the polygons as they stand.
+  // Counts over the unmodified polygons.
   std::int64_t points = 0, triangles = 0, quads = 0;
   std::int64_t boundary_edges = 0, non_manifold_edges = 0, non_manifold_vertices = 0, inconsistent_edges = 0;
   std::int64_t degenerate_polygons = 0, duplicate_polygons = 0, isolated_points = 0;
   std::int64_t components = 0, euler_characteristic = 0;
   std::optional<double> genus;  ///< sum over components; only of a closed, manifold, oriented mesh
-  /// Components with negative volume that are no cavities of others (inside_out.h); only of a closed,
+  /// Components with negative volume that are not cavities of others (count_inside_out()); only of a closed,
   /// oriented mesh with polygons.
   std::optional<std::int64_t> inside_out_components;
   double volume = 0.0, area = 0.0;
@@ -124,21 +130,21 @@ struct MeshReport {
       degenerate_places, duplicate_places, inside_out_places;
 
   std::vector<LibraryCounts> libraries;
-  std::optional<SelfIntersections> self_intersections;  ///< absent when not asked for
+  std::optional<SelfIntersections> self_intersections;  ///< absent if not requested
   std::optional<Distances> to_reference, from_reference;
   std::optional<NormalAngles> normals_to_reference;
   std::optional<HausdorffBound> certified_to_reference, certified_from_reference;
   std::optional<FeatureDistances> features;
-  std::optional<SolidComparison> solid;  ///< compared with the reference's
-  std::optional<VisibleLoss> visible;    ///< compared with the reference; absent where no voxel size is known
+  std::optional<SolidComparison> solid;
+  std::optional<VisibleLoss> visible;  ///< absent if no voxel size is known
 
   bool closed() const { return boundary_edges == 0; }
   bool manifold() const { return non_manifold_edges == 0 && non_manifold_vertices == 0; }
   bool oriented() const { return inconsistent_edges == 0; }
-  /// Whether no component is inside out; true if it is not known.
+  /// Returns true if no component is inside out, or if that is unknown.
   bool faces_outwards() const { return inside_out_components.value_or(0) == 0; }
-  /// Whether the mesh is closed, manifold, oriented, free of self-intersections and nowhere inside out. False
-  /// when self-intersections were not asked for.
+  /// Returns true if the mesh is closed, manifold, oriented, free of self-intersections and nowhere inside
+  /// out; false if self-intersections were not searched for.
   bool watertight() const {
     return closed() && manifold() && oriented() && faces_outwards() && self_intersections &&
            self_intersections->pairs == 0;
@@ -148,31 +154,31 @@ struct MeshReport {
       if (!l.disagreements.empty()) return false;
     return true;
   }
-  std::vector<std::string> sentences() const;  ///< the verdict in words, most important first
+  std::vector<std::string> sentences() const;  ///< returns the verdict in words, most important first
 };
 
-struct JudgeOptions {
+struct CheckOptions {
   bool self_intersections = true;
-  bool libraries = true;                ///< let OpenMesh and CGAL count, too
+  bool libraries = true;                ///< counts by OpenMesh and CGAL, too
   const MeshFile* reference = nullptr;  ///< the mesh that distances are measured to
-  /// How the reference's quads are cut: as_given for a mesh about which something was proved with its quads
-  /// as they are cut, such as an extractor's own uniform one.
+  /// How the reference's quads are cut: as_given for a mesh with guarantees that depend on the given
+  /// diagonals, such as an extractor's uniform mesh.
   QuadRule reference_quads = QuadRule::better;
-  std::int64_t samples = 200'000;        ///< on each surface, by area, besides every point of it
-  bool certify = false;                  ///< certified Hausdorff bound, both ways
-  std::int64_t solid_samples = 100'000;  ///< to compare the solid with the reference's; 0 = not at all
-  std::int64_t visible_samples =
-      20'000;                ///< to measure the visible loss if `voxel_size` is known; 0 = not at all
+  std::int64_t samples = 200'000;         ///< on each surface, by area, in addition to all its vertices
+  bool certify = false;                   ///< certified Hausdorff bound in both directions
+  std::int64_t solid_samples = 100'000;   ///< for comparing the solids; 0: no comparison
+  std::int64_t visible_samples = 20'000;  ///< for the visible loss, if `voxel_size` is known; 0: not measured
   double voxel_size = 0.0;   ///< world units, of the volume that the mesh was made from; 0 = unknown
   double certify_gap = 0.0;  ///< world units; 0 = 1e-4 of the reference's diagonal
   const MeshFile* features = nullptr;  ///< reference for the sharp features
   double dihedral_degrees = 30.0;
 };
 
-/// Judges a mesh as its file holds it. The report depends on the input alone, at any thread count. It has no
-/// distances and no features if the mesh has no polygons.
-/// @throws Cancelled; Error when a reference holds no polygon, when a point is not finite, or when a polygon
-/// refers to a point that is not there.
-MeshReport judge(const MeshFile& mesh, const JudgeOptions& options, RunContext& context);
+/// Validates a mesh without modifying it. The report is the same at any thread count, and has no distances
+/// and no features if the mesh has no polygons. Meshes with coordinates beyond 2^±150 are validated at
+/// another scale; values beyond the range of double precision become infinite, or NaN instead of 0.
+/// @throws Cancelled; Error if a reference has no polygons, a point is not finite, a polygon refers to a
+/// missing point, or coordinates span too many orders of magnitude.
+MeshReport check_mesh(const MeshFile& mesh, const CheckOptions& options, RunContext& context);
 
 }  // namespace hermesh::validation

@@ -21,7 +21,7 @@ Eigen::Vector3d position(const Mesh& mesh, Mesh::VertexHandle v) {
   return {p[0], p[1], p[2]};
 }
 
-// Adds all polygons. Returns a sentence about the first that is refused, or nothing.
+// Adds all polygons. Returns a sentence about the first refused one, or an empty string.
 std::string load(const MeshFile& file, double unit, Mesh& mesh, const RunContext& context) {
   const auto polygons = std::size_t(polygon_count(file));
   mesh.reserve(file.points.size(), file.points.size() + polygons, polygons);
@@ -30,7 +30,7 @@ std::string load(const MeshFile& file, double unit, Mesh& mesh, const RunContext
   for (std::int64_t p = 0; p < polygon_count(file); ++p) {
     if (p % 65536 == 0) context.check();
     const PolygonCorners corners = polygon_corners(file, p);
-    // add_face() takes it for granted that the corners differ.
+    // add_face() requires distinct corners.
     if (repeats_corner(corners))
       return "OpenMesh cannot hold " + describe_polygon(file, p, unit) +
              ", which has one point at two corners.";
@@ -43,8 +43,9 @@ std::string load(const MeshFile& file, double unit, Mesh& mesh, const RunContext
   return {};
 }
 
-// OpenMesh takes two fans at one point as long as one of them is open when the other comes. Then either the
-// point has two gaps, or walking around it leaves polygons out.
+// Returns a sentence about the first vertex with several fans, or an empty string. OpenMesh accepts two fans
+// at one vertex if one of them is open when the other is added. Then either the vertex has two gaps, or a
+// walk around it misses polygons.
 std::string find_singular_vertex(const MeshFile& file, double unit, const Mesh& mesh) {
   std::vector<std::uint32_t> polygons_at(file.points.size(), 0);
   for (std::int64_t p = 0; p < polygon_count(file); ++p) {
@@ -84,7 +85,7 @@ std::int64_t count_components(const Mesh& mesh) {
   return components;
 }
 
-// The corners of a polygon, beginning where the fan starts that cuts it: anywhere in a triangle.
+// Returns the corners of a polygon, beginning at the apex of the fan that cuts it.
 std::vector<Eigen::Vector3d> fan(const Mesh& mesh, const MeshFile& file, Mesh::FaceHandle f) {
   std::vector<Eigen::Vector3d> corners;
   std::size_t start = 0;
@@ -126,7 +127,7 @@ LibraryFindings count(const Mesh& mesh, const MeshFile& file) {
 
 LibraryCounts count_with_openmesh(const MeshFile& file, const MeshReport& ours, RunContext& context,
                                   double unit) {
-  // Its complaints about polygons that it refuses go into the report rather than to the terminal.
+  // Refused polygons are reported, not printed to the terminal.
   omerr().disable();
   Mesh mesh;
   std::string refusal = load(file, unit, mesh, context);

@@ -1,19 +1,128 @@
 #include "validation/outer_boundary.h"
 
 #include <tbb/parallel_for.h>
+#include <tbb/parallel_sort.h>
 
-#include <Eigen/Geometry>
 #include <algorithm>
 #include <limits>
 #include <utility>
 
 #include "algorithms/core/disjoint_sets.h"
-#include "validation/geometry/near_pairs.h"
+#include "validation/geometry/sum_ranges.h"
 
 namespace hermesh::validation {
 namespace {
 
-/// How a part of a triangle lies to the solid.
+using Eigen::Vector3d;
+/// The numbers of two triangles, the smaller one first.
+using TrianglePair = std::array<std::uint32_t, 2>;
+
+/// Returns the squared distance of two segments (Ericson, Real-Time Collision Detection, 2005, §5.1.9).
+double squared_distance_of_segments(const Vector3d& p1, const Vector3d& q1, const Vector3d& p2,
+                                    const Vector3d& q2) {
+  const Vector3d d1 = q1 - p1, d2 = q2 - p2, r = p1 - p2;
+  const double a = d1.squaredNorm(), e = d2.squaredNorm(), b = d1.dot(d2), c = d1.dot(r), f = d2.dot(r);
+  const double denominator = a * e - b * b;
+  double s = denominator > 1e-12 * a * e ? std::clamp((b * f - c * e) / denominator, 0.0, 1.0) : 0.0;
+  double t = (b * s + f) / e;
+  if (t < 0.0 || t > 1.0) {
+    t = std::clamp(t, 0.0, 1.0);
+    s = std::clamp((b * t - c) / a, 0.0, 1.0);
+  }
+  return (p1 + s * d1 - p2 - t * d2).squaredNorm();
+}
+
+bool pierces(const Vector3d& p, const Vector3d& q, const Corners& t, const Vector3d& normal) {
+  const double from = normal.dot(p - t[0]), to = normal.dot(q - t[0]);
+  if (from * to > 0.0 || from == to) return false;
+  const Vector3d at = p + from / (from - to) * (q - p);
+  for (int k = 0; k < 3; ++k)
+    if (normal.cross(t[(k + 1) % 3] - t[k]).dot(at - t[k]) < 0.0) return false;
+  return true;
+}
+
+class NearPairSearch {
+ public:
+  NearPairSearch(const TriangleSoup& soup, const TriangleTree& tree, double reach)
+      : soup_(soup), tree_(tree), reach_(reach), squared_(reach * reach) {}
+
+  void search(std::size_t slot, std::vector<TrianglePair>& pairs) const {
+    const std::uint32_t a = tree_.triangle(slot);
+    const Corners& first = tree_.corners(slot);
+    const Vector3d normal = area_vector(first).stableNormalized();
+    tree_.for_each_near(box_of(first), reach_, [&](std::uint32_t other) {
+      const std::uint32_t b = tree_.triangle(other);
+      if (a < b && !apart(first, normal, tree_.corners(other)) && near(a, first, b, tree_.corners(other)))
+        pairs.push_back({a, b});
+      return true;
+    });
+  }
+
+ private:
+  bool apart(const Corners& plane, const Vector3d& normal, const Corners& t) const {
+    double least = std::numeric_limits<double>::infinity(), greatest = -least;
+    for (const Vector3d& corner : t) {
+      const double height = normal.dot(corner - plane[0]);
+      least = std::min(least, height), greatest = std::max(greatest, height);
+    }
+    return least > reach_ || greatest < -reach_;
+  }
+
+  bool near(std::uint32_t a, const Corners& ca, std::uint32_t b, const Corners& cb) const {
+    const Triangle &ta = soup_.triangles[a], &tb = soup_.triangles[b];
+    const auto in = [](std::uint32_t p, const Triangle& t) { return p == t[0] || p == t[1] || p == t[2]; };
+    std::array<bool, 3> a_shared{}, b_shared{};
+    for (std::size_t k = 0; k < 3; ++k) a_shared[k] = in(ta[k], tb), b_shared[k] = in(tb[k], ta);
+    if (std::ranges::count(a_shared, true) == 3) return true;
+    return opposite_comes_near(ca, a_shared, cb) || opposite_comes_near(cb, b_shared, ca);
+  }
+
+  /// Returns true if a corner or a side without shared corners comes near the other triangle.
+  bool opposite_comes_near(const Corners& c, const std::array<bool, 3>& shared, const Corners& t) const {
+    const Vector3d normal = area_vector(t);
+    for (std::size_t k = 0; k < 3; ++k) {
+      if (shared[k]) continue;
+      if ((closest_point(t, c[k]) - c[k]).squaredNorm() <= squared_) return true;
+      const std::size_t next = (k + 1) % 3;
+      if (shared[next]) continue;
+      if (pierces(c[k], c[next], t, normal)) return true;
+      for (std::size_t side = 0; side < 3; ++side)
+        if (squared_distance_of_segments(c[k], c[next], t[side], t[(side + 1) % 3]) <= squared_) return true;
+    }
+    return false;
+  }
+
+  const TriangleSoup& soup_;
+  const TriangleTree& tree_;
+  double reach_, squared_;
+};
+
+/// Returns pairs of triangles that intersect or nearly intersect although they are not neighbours, by their
+/// numbers, in increasing order. A pair is listed if
+///  - the two share no corner and come within `reach` of one another;
+///  - they share one corner, and a side opposite to it comes within `reach` of the other triangle;
+///  - they share two, and a corner opposite to their edge comes within `reach` of the other triangle;
+///  - they share all three.
+/// Corners are shared by number. Faces that coincide except for rounding are such pairs, which exact
+/// predicates (self_intersection.h) would separate; a triangle smaller than `reach` may be one with its
+/// neighbours.
+/// @throws Cancelled.
+std::vector<TrianglePair> near_pairs(const TriangleSoup& soup, const TriangleTree& tree, double reach,
+                                     const RunContext& context) {
+  const NearPairSearch search(soup, tree, reach);
+  struct Found {
+    std::vector<TrianglePair> pairs;
+    void append(const Found& later) { pairs.insert(pairs.end(), later.pairs.begin(), later.pairs.end()); }
+  };
+  Found found =
+      sum_ranges<Found>(tree.size(), 1024, context, [&](std::size_t begin, std::size_t end, Found& sum) {
+        for (std::size_t slot = begin; slot < end; ++slot) search.search(slot, sum.pairs);
+      });
+  tbb::parallel_sort(found.pairs.begin(), found.pairs.end());
+  return std::move(found.pairs);
+}
+
+/// The position of a part of a triangle relative to the solid.
 enum class Role : std::uint8_t { inner, bounding, bounding_reversed, possible, copy };
 
 constexpr double kCoarse = 1.0 / 32, kFine = 1.0 / 256, kStep = 1e-6;  // of the diagonal
@@ -22,7 +131,7 @@ double longest_edge(const Corners& t) {
   return std::max({(t[1] - t[0]).norm(), (t[2] - t[1]).norm(), (t[0] - t[2]).norm()});
 }
 
-double twice_area(const Corners& t) { return (t[1] - t[0]).cross(t[2] - t[0]).norm(); }
+double twice_area(const Corners& t) { return area_vector(t).norm(); }
 
 /// The parts of one triangle that is cut, with their areas.
 struct Parts {
@@ -53,9 +162,10 @@ class Finder {
     pairs_ = near_pairs(soup_, tree_, 2.0 * step_, context_);
     group();
     roles_.assign(soup_.triangles.size(), Role::inner);
-    tbb::parallel_for(std::size_t(0), speakers_.size(), [&](std::size_t i) {
+    tbb::parallel_for(std::size_t(0), representatives_.size(), [&](std::size_t i) {
       context_.check();
-      roles_[speakers_[i]] = role_at(soup_.corners(speakers_[i]), {1, 1, 1}, speakers_[i]);
+      roles_[representatives_[i]] =
+          role_at(soup_.corners(representatives_[i]), {1, 1, 1}, representatives_[i]);
     });
     parts_.resize(cut_.size());
     tbb::parallel_for(std::size_t(0), cut_.size(), [&](std::size_t i) {
@@ -66,34 +176,18 @@ class Finder {
   }
 
  private:
-  // Triangles that meet nothing but neighbours, joined where two face the same way over an edge of their own.
+  // Groups triangles that intersect only neighbours, across edges with two consistently oriented sides.
   void group() {
     const std::size_t n = soup_.triangles.size();
     meets_.assign(n, 0);
     for (const auto& [a, b] : pairs_) meets_[a] = meets_[b] = 1;
     DisjointSets sets(n);
-    struct HalfEdge {
-      std::uint32_t low, high, triangle;
-      int way;
-    };
-    std::vector<HalfEdge> sides;
-    sides.reserve(3 * n);
-    for (std::uint32_t t = 0; t < n; ++t)
-      for (int k = 0; k < 3; ++k) {
-        const std::uint32_t a = soup_.triangles[t][k], b = soup_.triangles[t][(k + 1) % 3];
-        sides.push_back({std::min(a, b), std::max(a, b), t, a < b ? 1 : -1});
-      }
-    std::sort(sides.begin(), sides.end(), [](const HalfEdge& a, const HalfEdge& b) {
-      return a.low != b.low ? a.low < b.low : a.high != b.high ? a.high < b.high : a.triangle < b.triangle;
+    for_each_edge(sorted_sides(soup_.triangles), [&](std::span<const TriangleSide> sides) {
+      const std::uint32_t a = sides.front().triangle, b = sides.back().triangle;
+      if (sides.size() == 2 && sides[0].direction + sides[1].direction == 0 && !meets_[a] && !meets_[b])
+        sets.join(a, b);
     });
-    for (std::size_t i = 0, end; i < sides.size(); i = end) {
-      for (end = i + 1;
-           end < sides.size() && sides[end].low == sides[i].low && sides[end].high == sides[i].high;)
-        ++end;
-      const std::uint32_t a = sides[i].triangle, b = sides[end - 1].triangle;
-      if (end - i == 2 && sides[i].way + sides[i + 1].way == 0 && !meets_[a] && !meets_[b]) sets.join(a, b);
-    }
-    speaker_of_.resize(n);
+    representative_of_.resize(n);
     std::vector<std::uint32_t> largest(n, ~std::uint32_t(0));
     for (std::uint32_t t = 0; t < n; ++t) {
       std::uint32_t& best = largest[sets.find(t)];
@@ -101,11 +195,11 @@ class Finder {
         best = t;
     }
     for (std::uint32_t t = 0; t < n; ++t) {
-      speaker_of_[t] = largest[sets.find(t)];
+      representative_of_[t] = largest[sets.find(t)];
       if (meets_[t])
         cut_.push_back(t);
-      else if (speaker_of_[t] == t)
-        speakers_.push_back(t);
+      else if (representative_of_[t] == t)
+        representatives_.push_back(t);
     }
   }
 
@@ -115,7 +209,7 @@ class Finder {
     result.bounding.points = result.possible.points = soup_.points;
     for (std::uint32_t t = 0; t < soup_.triangles.size(); ++t) {
       if (meets_[t]) continue;
-      const Role role = roles_[speaker_of_[t]];
+      const Role role = roles_[representative_of_[t]];
       if (role == Role::inner) continue;
       const bool possible = role == Role::possible;
       (possible ? result.possible_area : result.area) += 0.5 * twice_area(soup_.corners(t));
@@ -138,12 +232,11 @@ class Finder {
     return result;
   }
 
-  /// The role of a triangle at a point of a part of it, which is given by the weights of the part's corners.
-  Role role_at(const Corners& part, const Eigen::Vector3d& weights, std::size_t triangle) const {
-    const Eigen::Vector3d at =
-        (weights[0] * part[0] + weights[1] * part[1] + weights[2] * part[2]) / weights.sum();
+  /// Returns the role of a triangle at a point of a part of it, given by the weights of the part's corners.
+  Role role_at(const Corners& part, const Vector3d& weights, std::size_t triangle) const {
+    const Vector3d at = (weights[0] * part[0] + weights[1] * part[1] + weights[2] * part[2]) / weights.sum();
     const Corners whole = soup_.corners(triangle);
-    const Eigen::Vector3d normal = (whole[1] - whole[0]).cross(whole[2] - whole[0]).stableNormalized();
+    const Vector3d normal = area_vector(whole).stableNormalized();
     if (is_copy(at, normal, triangle)) return Role::copy;
     const Side front = solid_.side(at + step_ * normal), back = solid_.side(at - step_ * normal);
     if (front == Side::outside && back == Side::inside) return Role::bounding;
@@ -151,12 +244,12 @@ class Finder {
     return front == back && front != Side::unknown ? Role::inner : Role::possible;
   }
 
-  bool is_copy(const Eigen::Vector3d& at, const Eigen::Vector3d& normal, std::size_t triangle) const {
+  bool is_copy(const Vector3d& at, const Vector3d& normal, std::size_t triangle) const {
     if (!meets_[triangle]) return false;
     return !tree_.for_each_near({at, at}, step_, [&](std::uint32_t slot) {
       if (tree_.triangle(slot) >= triangle) return true;
       const Corners& t = tree_.corners(slot);
-      const Eigen::Vector3d other = (t[1] - t[0]).cross(t[2] - t[0]).stableNormalized();
+      const Vector3d other = area_vector(t).stableNormalized();
       return std::abs(other.dot(normal)) < 1.0 - 1e-9 || (closest_point(t, at) - at).norm() > step_;
     });
   }
@@ -168,8 +261,8 @@ class Finder {
     if (longest <= kCoarse * diagonal_ && role_at(part, {18, 1, 1}, triangle) == role &&
         role_at(part, {1, 18, 1}, triangle) == role && role_at(part, {1, 1, 18}, triangle) == role)
       return parts.add(part, role);
-    const Eigen::Vector3d ab = 0.5 * (part[0] + part[1]), bc = 0.5 * (part[1] + part[2]),
-                          ca = 0.5 * (part[2] + part[0]);
+    const Vector3d ab = 0.5 * (part[0] + part[1]), bc = 0.5 * (part[1] + part[2]),
+                   ca = 0.5 * (part[2] + part[0]);
     for (const Corners& quarter :
          {Corners{part[0], ab, ca}, Corners{ab, part[1], bc}, Corners{ca, bc, part[2]}, Corners{ab, bc, ca}})
       divide(quarter, triangle, parts);
@@ -199,10 +292,10 @@ class Finder {
   const Solid& solid_;
   const RunContext& context_;
   double diagonal_, step_ = 0.0;
-  std::vector<std::array<std::uint32_t, 2>> pairs_;
-  std::vector<std::uint8_t> meets_;  ///< for each triangle: whether it meets one that is no neighbour
-  std::vector<std::uint32_t> speaker_of_, speakers_, cut_;
-  std::vector<Role> roles_;   ///< roles of the triangles in speakers_
+  std::vector<TrianglePair> pairs_;
+  std::vector<std::uint8_t> meets_;  ///< for each triangle: 1 if it intersects one that is not a neighbour
+  std::vector<std::uint32_t> representative_of_, representatives_, cut_;
+  std::vector<Role> roles_;   ///< roles of the triangles in representatives_
   std::vector<Parts> parts_;  ///< parts of the triangles in cut_
 };
 

@@ -1,18 +1,16 @@
 #include <tbb/parallel_invoke.h>
 
 #include <cmath>
+#include <limits>
 #include <sstream>
 
 #include "validation/features.h"
 #include "validation/geometry/distance.h"
 #include "validation/hausdorff.h"
-#include "validation/inside_out.h"
 #include "validation/library_counts.h"
-#include "validation/measures.h"
 #include "validation/mesh_report.h"
-#include "validation/normal_error.h"
-#include "validation/report_scale.h"
 #include "validation/self_intersection.h"
+#include "validation/solid.h"
 #include "validation/solid_comparison.h"
 #include "validation/topology.h"
 #include "validation/visible_loss.h"
@@ -20,12 +18,12 @@
 namespace hermesh::validation {
 namespace {
 
-// Readers of files check this, too; a mesh that was made in memory comes here unchecked.
+// Applies the checks of the file readers to a mesh that was made in memory.
 void check_input(const MeshFile& mesh, const std::string& name) {
   for (std::size_t p = 0; p < mesh.points.size(); ++p)
     if (!mesh.points[p].allFinite())
       throw Error("point " + std::to_string(p) + " of " + name +
-                  " has a coordinate that is not a finite number; repair the mesh before it is judged");
+                  " has a coordinate that is not a finite number; repair the mesh before it is validated");
   const std::size_t points = mesh.points.size();
   for (std::int64_t p = 0; p < polygon_count(mesh); ++p)
     for (std::uint32_t corner : polygon_corners(mesh, p).points)
@@ -48,7 +46,7 @@ void count_with_libraries(const MeshFile& mesh, double unit, MeshReport& report,
   report.libraries = {std::move(openmesh), std::move(cgal)};
 }
 
-void measure_distances(const TriangleSoup& soup, const TriangleTree& tree, const JudgeOptions& options,
+void measure_distances(const TriangleSoup& soup, const TriangleTree& tree, const CheckOptions& options,
                        MeshReport& report, RunContext& context) {
   const TriangleSoup reference(*options.reference, options.reference_quads);
   const TriangleTree reference_tree(reference);
@@ -66,8 +64,8 @@ void measure_distances(const TriangleSoup& soup, const TriangleTree& tree, const
   report.certified_from_reference = certified_distance(reference, tree, gap, context);
 }
 
-// What needs a surface to be there.
-void judge_surface(const MeshFile& mesh, const TriangleSoup& soup, const JudgeOptions& options,
+// Fills the results that require a surface with triangles.
+void check_surface(const MeshFile& mesh, const TriangleSoup& soup, const CheckOptions& options,
                    MeshReport& report, RunContext& context) {
   const TriangleTree tree(soup);
   count_inside_out(soup, tree, report, context);
@@ -100,7 +98,7 @@ std::string counted(std::int64_t n, const std::string& one, const std::string& m
   return std::to_string(n) + " " + (n == 1 ? one : many);
 }
 
-// "; the first at (x, y, z), polygons 3 and 7"
+// Returns a text such as "; the first at (x, y, z), polygons 3 and 7".
 std::string first_place(const Places& places) {
   if (places.points.empty()) return "";
   std::string text = "; the first at " + describe_point(places.points[0]) + ", polygon";
@@ -292,7 +290,99 @@ std::vector<std::string> MeshReport::sentences() const { return Verdict(*this).s
 
 namespace {
 
-MeshReport judge_scaled(const MeshFile& mesh, const JudgeOptions& options, double unit, RunContext& context) {
+// Meshes whose measures double precision could not hold are multiplied by a power of two, and the report is
+// converted back to their own units.
+
+constexpr int kMostExponent = 150;
+
+// Returns the power of two by which coordinates have to be multiplied so that products of several lengths
+// stay in the range of double precision: 1 if the largest coordinate is between 2^-150 and 2^150. Skips null
+// pointers.
+double comfortable_scale(std::initializer_list<const MeshFile*> meshes) {
+  double largest = 0.0;
+  for (const MeshFile* mesh : meshes)
+    if (mesh)
+      for (const Eigen::Vector3d& p : mesh->points) largest = std::max(largest, p.cwiseAbs().maxCoeff());
+  if (largest == 0.0 || std::abs(std::ilogb(largest)) <= kMostExponent) return 1.0;
+  return std::ldexp(1.0, -std::ilogb(largest));
+}
+
+// Returns the mesh times a power of two, without its attributes. @throws Error if a coordinate would lose
+// digits.
+MeshFile scaled(const MeshFile& mesh, double scale, const std::string& name) {
+  MeshFile result;
+  result.triangles = mesh.triangles;
+  result.quads = mesh.quads;
+  result.points.reserve(mesh.points.size());
+  for (const Eigen::Vector3d& p : mesh.points) {
+    result.points.push_back(scale * p);
+    if (result.points.back() / scale != p)
+      throw Error("the coordinates of " + name +
+                  " span too many orders of magnitude; scale the mesh, or remove its distant parts");
+  }
+  return result;
+}
+
+// Converts the report of meshes that were multiplied by a power of two.
+class Unscaler {
+ public:
+  explicit Unscaler(double unit) : unit_(unit) {}
+
+  void report(MeshReport& r) const {
+    measure(r.area, 2), measure(r.volume, 3);
+    for (Places* p :
+         {&r.boundary_places, &r.non_manifold_edge_places, &r.non_manifold_vertex_places,
+          &r.inconsistent_places, &r.degenerate_places, &r.duplicate_places, &r.inside_out_places})
+      places(*p);
+    for (LibraryCounts& l : r.libraries) power(l.area, 2), power(l.volume, 3);
+    if (r.self_intersections) places(r.self_intersections->places);
+    for (std::optional<Distances>* d : {&r.to_reference, &r.from_reference})
+      if (*d) distances(**d);
+    for (std::optional<HausdorffBound>* b : {&r.certified_to_reference, &r.certified_from_reference})
+      if (*b) power((*b)->lower, 1), power((*b)->upper, 1);
+    if (r.features) {
+      power(r.features->edge_length, 1);
+      distances(r.features->edge_to_mesh), distances(r.features->corner_to_mesh);
+    }
+    if (r.solid) solid(*r.solid);
+  }
+
+ private:
+  // Multiplies step by step, because a power of the unit may exceed the range of its product with the value.
+  void power(double& value, int exponent) const {
+    for (int i = 0; i < exponent; ++i) value *= unit_;
+  }
+  // Replaces a value that is too small for double precision by NaN, because 0 would be wrong.
+  void measure(double& value, int exponent) const {
+    const bool nonzero = value != 0.0;
+    power(value, exponent);
+    if (nonzero && value == 0.0) value = std::numeric_limits<double>::quiet_NaN();
+  }
+  void estimate(Estimate& e, int exponent) const {
+    for (double* value : {&e.value, &e.lower, &e.upper}) power(*value, exponent);
+  }
+  void places(Places& value) const {
+    for (Eigen::Vector3d& p : value.points) p *= unit_;
+  }
+  void distances(Distances& d) const {
+    for (double* value : {&d.max, &d.mean, &d.rms}) power(*value, 1);
+    d.worst *= unit_;
+  }
+  void solid(SolidComparison& s) const {
+    for (Estimate* e :
+         {&s.mesh_volume, &s.reference_volume, &s.difference, &s.unknown_volume, &s.unexplained})
+      estimate(*e, 3);
+    for (Estimate* e : {&s.false_area, &s.lost_area}) estimate(*e, 2);
+    for (double* area : {&s.mesh_area, &s.reference_area, &s.possible_area}) power(*area, 2);
+    power(s.explained, 1);
+    for (std::optional<Eigen::Vector3d>* p : {&s.false_place, &s.lost_place, &s.unexplained_place})
+      if (*p) **p *= unit_;
+  }
+
+  double unit_;
+};
+
+MeshReport check_scaled(const MeshFile& mesh, const CheckOptions& options, double unit, RunContext& context) {
   MeshReport report;
   const TriangleSoup soup(mesh);
   {
@@ -302,7 +392,7 @@ MeshReport judge_scaled(const MeshFile& mesh, const JudgeOptions& options, doubl
   }
   if (options.libraries) count_with_libraries(mesh, unit, report, context);
   if (!soup.triangles.empty())
-    judge_surface(mesh, soup, options, report, context);
+    check_surface(mesh, soup, options, report, context);
   else if (options.self_intersections)
     report.self_intersections.emplace();
   return report;
@@ -310,13 +400,13 @@ MeshReport judge_scaled(const MeshFile& mesh, const JudgeOptions& options, doubl
 
 }  // namespace
 
-MeshReport judge(const MeshFile& mesh, const JudgeOptions& options, RunContext& context) {
+MeshReport check_mesh(const MeshFile& mesh, const CheckOptions& options, RunContext& context) {
   check_input(mesh, "the mesh");
   check_reference(options.reference, "the reference mesh");
   check_reference(options.features, "the reference mesh for the features");
   const double scale = comfortable_scale({&mesh, options.reference, options.features});
-  if (scale == 1.0) return judge_scaled(mesh, options, 1.0, context);
-  JudgeOptions at_scale = options;
+  if (scale == 1.0) return check_scaled(mesh, options, 1.0, context);
+  CheckOptions at_scale = options;
   MeshFile reference, features;
   const auto replace = [&](const MeshFile*& given, MeshFile& copy) {
     if (!given) return;
@@ -327,8 +417,8 @@ MeshReport judge(const MeshFile& mesh, const JudgeOptions& options, RunContext& 
   replace(at_scale.features, features);
   at_scale.certify_gap *= scale;
   at_scale.voxel_size *= scale;
-  MeshReport report = judge_scaled(scaled(mesh, scale, "the mesh"), at_scale, 1.0 / scale, context);
-  unscale(report, scale);
+  MeshReport report = check_scaled(scaled(mesh, scale, "the mesh"), at_scale, 1.0 / scale, context);
+  Unscaler(1.0 / scale).report(report);
   return report;
 }
 

@@ -8,13 +8,13 @@
 #include "validation/report_json.h"
 
 namespace hermesh::validation {
-namespace {
+namespace report_test {
 
 using namespace test;
 
-MeshReport judged(const MeshFile& mesh, const JudgeOptions& options = {}) {
+MeshReport checked(const MeshFile& mesh, const CheckOptions& options = {}) {
   RunContext context;
-  return judge(mesh, options, context);
+  return check_mesh(mesh, options, context);
 }
 
 bool says(const MeshReport& report, const std::string& text) {
@@ -23,9 +23,9 @@ bool says(const MeshReport& report, const std::string& text) {
                      [&](const std::string& s) { return s.find(text) != std::string::npos; });
 }
 
-std::string error_of(const MeshFile& mesh, const JudgeOptions& options = {}) {
+std::string error_of(const MeshFile& mesh, const CheckOptions& options = {}) {
   try {
-    judged(mesh, options);
+    checked(mesh, options);
   } catch (const Error& e) {
     return e.what();
   }
@@ -33,7 +33,7 @@ std::string error_of(const MeshFile& mesh, const JudgeOptions& options = {}) {
 }
 
 TEST(Report, CleanMesh) {
-  const MeshReport r = judged(cube_of_quads());
+  const MeshReport r = checked(cube_of_quads());
   EXPECT_TRUE(r.watertight());
   EXPECT_TRUE(r.libraries_agree());
   EXPECT_EQ(r.libraries.size(), 2u);
@@ -43,19 +43,15 @@ TEST(Report, CleanMesh) {
 }
 
 TEST(Report, OutermostComponentsThatAreInsideOutAreCounted) {
-  const auto flipped = [](MeshFile mesh) {
-    for (Quad& q : mesh.quads) std::swap(q[1], q[3]);
-    return mesh;
-  };
   const MeshFile large = cube_of_quads({0, 0, 0}, 8.0), small = cube_of_quads({10, 0, 0}, 1.0),
                  within = cube_of_quads({3, 3, 3}, 1.0), core = cube_of_quads({3.25, 3.25, 3.25}, 0.5);
   const auto count = [](const MeshFile& mesh) {
-    return judged(mesh, {.libraries = false}).inside_out_components;
+    return checked(mesh, {.libraries = false}).inside_out_components;
   };
   EXPECT_EQ(count(large), 0);
-  EXPECT_EQ(count(flipped(large)), 1);
+  EXPECT_EQ(count(reversed(large)), 1);
   // The total volume is positive.
-  const MeshReport report = judged(together(large, flipped(small)), {.libraries = false});
+  const MeshReport report = checked(together(large, reversed(small)), {.libraries = false});
   EXPECT_EQ(report.inside_out_components, 1);
   EXPECT_GT(report.volume, 0.0);
   EXPECT_FALSE(report.watertight());
@@ -63,18 +59,18 @@ TEST(Report, OutermostComponentsThatAreInsideOutAreCounted) {
   EXPECT_GE(report.inside_out_places.points[0].x(), 10.0);
   EXPECT_EQ(to_json(report).at("inside_out_components"), 1);
   // A cavity, and a body in it.
-  EXPECT_EQ(count(together(large, flipped(within))), 0);
-  EXPECT_EQ(count(together(together(large, flipped(within)), core)), 0);
-  EXPECT_EQ(count(together(together(large, flipped(within)), flipped(core))), 1);
+  EXPECT_EQ(count(together(large, reversed(within))), 0);
+  EXPECT_EQ(count(together(together(large, reversed(within)), core)), 0);
+  EXPECT_EQ(count(together(together(large, reversed(within)), reversed(core))), 1);
   MeshFile open = large;
   open.quads.pop_back();
   EXPECT_FALSE(count(open).has_value());
 }
 
 TEST(Report, NothingIsWatertightUnlessItWasSearched) {
-  JudgeOptions options;
+  CheckOptions options;
   options.self_intersections = false;
-  const MeshReport r = judged(cube_of_quads(), options);
+  const MeshReport r = checked(cube_of_quads(), options);
   EXPECT_FALSE(r.watertight());
   EXPECT_TRUE(says(r, "not searched for self-intersections"));
   EXPECT_TRUE(to_json(r).at("self_intersecting_pairs").is_null());
@@ -84,29 +80,29 @@ TEST(Report, NothingIsWatertightUnlessItWasSearched) {
 TEST(Report, SentencesNameCountAndPlace) {
   MeshFile hole = cube_of_quads();
   hole.quads.pop_back();
-  EXPECT_TRUE(says(judged(hole), "The mesh is not closed, manifold, oriented"));
-  EXPECT_TRUE(says(judged(hole), "4 boundary edges; the first at (0.5, 0, 1), polygon 2."));
+  EXPECT_TRUE(says(checked(hole), "The mesh is not closed, manifold, oriented"));
+  EXPECT_TRUE(says(checked(hole), "4 boundary edges; the first at (0.5, 0, 1), polygon 2."));
   const MeshFile edge = welded(together(cube_of_quads(), cube_of_quads({1.0, 1.0, 0.0})));
-  EXPECT_TRUE(says(judged(edge), "1 edge with more than two polygons; the first at (1, 1, 0.5), polygons "));
-  EXPECT_TRUE(says(judged(edge), "CGAL cannot load such a mesh, as expected: "));
-  EXPECT_TRUE(judged(edge).libraries_agree());
+  EXPECT_TRUE(says(checked(edge), "1 edge with more than two polygons; the first at (1, 1, 0.5), polygons "));
+  EXPECT_TRUE(says(checked(edge), "CGAL cannot load such a mesh, as expected: "));
+  EXPECT_TRUE(checked(edge).libraries_agree());
   const MeshFile overlap = together(cube_of_quads(), cube_of_quads({0.5, 0.4, 0.3}));
-  EXPECT_TRUE(says(judged(overlap), "and intersects itself"));
-  EXPECT_FALSE(judged(overlap).watertight());
-  MeshReport wrong = judged(cube_of_quads());
+  EXPECT_TRUE(says(checked(overlap), "and intersects itself"));
+  EXPECT_FALSE(checked(overlap).watertight());
+  MeshReport wrong = checked(cube_of_quads());
   wrong.libraries[0].disagreements = {"OpenMesh finds a number of components of 2 where our count is 1."};
   EXPECT_FALSE(wrong.libraries_agree());
   EXPECT_TRUE(says(wrong, "Disagreement: OpenMesh finds"));
-  EXPECT_TRUE(says(judged(MeshFile{}), "The mesh has no polygons."));
+  EXPECT_TRUE(says(checked(MeshFile{}), "The mesh has no polygons."));
 }
 
 TEST(Report, DistancesAndFeatures) {
   const MeshFile reference = cube_of_quads({-1, -1, -1}, 2.0), mesh = cube_of_quads({-0.5, -0.5, -0.5}, 1.0);
-  JudgeOptions options;
+  CheckOptions options;
   options.reference = options.features = &reference;
   options.certify = true;
   options.samples = 1000;
-  const MeshReport r = judged(mesh, options);
+  const MeshReport r = checked(mesh, options);
   EXPECT_DOUBLE_EQ(r.to_reference->max, 0.5);
   EXPECT_DOUBLE_EQ(r.from_reference->max, std::sqrt(0.75));
   // The default gap is 1e-4 of the reference's diagonal.
@@ -128,7 +124,7 @@ TEST(Report, DistancesAndFeatures) {
 TEST(Report, JsonHoldsTheCounts) {
   MeshFile mesh = cube_of_triangles();
   mesh.triangles.push_back({0, 0, 1});
-  const nlohmann::json json = to_json(judged(mesh));
+  const nlohmann::json json = to_json(checked(mesh));
   for (const char* key :
        {"points", "triangles", "quads", "boundary_edges", "non_manifold_edges", "non_manifold_vertices",
         "inconsistent_edges", "degenerate_polygons", "duplicate_polygons", "isolated_points", "components",
@@ -143,7 +139,7 @@ TEST(Report, JsonHoldsTheCounts) {
   EXPECT_EQ(json.at("places").at("degenerate_polygons").at(0).at("polygons").at(0), 12);
   EXPECT_EQ(json.at("libraries").at("CGAL").at("loaded"), false);
   EXPECT_FALSE(json.contains("to_reference"));
-  const nlohmann::json clean = to_json(judged(cube_of_triangles()));
+  const nlohmann::json clean = to_json(checked(cube_of_triangles()));
   EXPECT_EQ(clean.at("genus"), 0);
   EXPECT_TRUE(clean.at("genus").is_number_integer());
   EXPECT_EQ(clean.at("self_intersecting_pairs"), 0);
@@ -156,7 +152,7 @@ TEST(Report, BadInputIsNamed) {
   EXPECT_NE(error_of(nan).find("point 5 of the mesh"), std::string::npos);
   MeshFile infinite = cube_of_quads();
   infinite.points[2].x() = std::numeric_limits<double>::infinity();
-  JudgeOptions options;
+  CheckOptions options;
   options.reference = &infinite;
   EXPECT_NE(error_of(cube_of_quads(), options).find("point 2 of the reference mesh"), std::string::npos);
   MeshFile index = cube_of_triangles();
@@ -169,9 +165,9 @@ TEST(Report, BadInputIsNamed) {
 
 TEST(Report, MeshWithoutPolygonsHasNoDistances) {
   const MeshFile reference = cube_of_quads();
-  JudgeOptions options;
+  CheckOptions options;
   options.reference = &reference;
-  const MeshReport r = judged(MeshFile{}, options);
+  const MeshReport r = checked(MeshFile{}, options);
   EXPECT_FALSE(r.to_reference);
   EXPECT_EQ(r.self_intersections->pairs, 0);
   EXPECT_TRUE(r.libraries_agree());
@@ -179,14 +175,14 @@ TEST(Report, MeshWithoutPolygonsHasNoDistances) {
 
 TEST(Report, ExtremeCoordinatesDoNotCrash) {
   for (double scale : {1e-200, 1e-30, 1e30, 1e200}) {
-    const MeshReport r = judged(cube_of_quads(Eigen::Vector3d::Constant(scale), scale));
+    const MeshReport r = checked(cube_of_quads(Eigen::Vector3d::Constant(scale), scale));
     EXPECT_TRUE(r.watertight()) << scale;
     EXPECT_EQ(r.degenerate_polygons, 0) << scale;
   }
 }
 
 TEST(Report, FiguresOfExtremeCoordinatesAreRightOrNotStated) {
-  const MeshReport large = judged(cube_of_quads(Eigen::Vector3d::Zero(), 1e100));
+  const MeshReport large = checked(cube_of_quads(Eigen::Vector3d::Zero(), 1e100));
   EXPECT_DOUBLE_EQ(large.area, 6e200);
   EXPECT_DOUBLE_EQ(large.volume, 1e300);
   EXPECT_TRUE(large.libraries_agree());
@@ -194,21 +190,21 @@ TEST(Report, FiguresOfExtremeCoordinatesAreRightOrNotStated) {
     EXPECT_DOUBLE_EQ(l.area, 6e200);
     EXPECT_DOUBLE_EQ(l.volume, 1e300);
   }
-  const MeshReport beyond = judged(cube_of_quads(Eigen::Vector3d::Zero(), 1e200));
+  const MeshReport beyond = checked(cube_of_quads(Eigen::Vector3d::Zero(), 1e200));
   EXPECT_TRUE(to_json(beyond).at("area").is_null());
   EXPECT_TRUE(says(beyond, "beyond the range of double precision"));
-  const MeshReport tiny = judged(cube_of_quads(Eigen::Vector3d::Zero(), 1e-200));
+  const MeshReport tiny = checked(cube_of_quads(Eigen::Vector3d::Zero(), 1e-200));
   EXPECT_TRUE(to_json(tiny).at("area").is_null());  // and not 0
   EXPECT_TRUE(says(tiny, "beyond the range of double precision"));
   // Distances at that scale, too.
   const MeshFile reference = cube_of_quads(Eigen::Vector3d::Constant(-1e120), 2e120);
-  JudgeOptions options;
+  CheckOptions options;
   options.reference = &reference;
   options.samples = 1000;
   options.solid_samples = 1000;
-  EXPECT_DOUBLE_EQ(judged(cube_of_quads(Eigen::Vector3d::Constant(-5e119), 1e120), options).to_reference->max,
-                   5e119);
-  // What no scale fits is refused.
+  EXPECT_DOUBLE_EQ(
+      checked(cube_of_quads(Eigen::Vector3d::Constant(-5e119), 1e120), options).to_reference->max, 5e119);
+  // Coordinates that cannot be scaled are refused.
   MeshFile spread = cube_of_quads(Eigen::Vector3d::Zero(), 1e300);
   spread.points[7] = Eigen::Vector3d::Constant(1.2345678901234567e-300);
   EXPECT_NE(error_of(spread).find("orders of magnitude"), std::string::npos);
@@ -218,8 +214,8 @@ TEST(Report, CanBeCancelled) {
   const std::atomic<bool> stop = true;
   RunContext context;
   context.cancel = &stop;
-  EXPECT_THROW(judge(cube_of_quads(), {}, context), Cancelled);
+  EXPECT_THROW(check_mesh(cube_of_quads(), {}, context), Cancelled);
 }
 
-}  // namespace
+}  // namespace report_test
 }  // namespace hermesh::validation

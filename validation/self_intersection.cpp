@@ -2,18 +2,16 @@
 
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
-#include <tbb/parallel_reduce.h>
 
 #include <algorithm>
 
 #include "validation/geometry/exact_predicates.h"
-#include "validation/geometry/places.h"
+#include "validation/geometry/sum_ranges.h"
 
 namespace hermesh::validation {
 namespace {
 
-// Where the shared corners stand in each triangle: the first `count` of ia and ib are shared, the rest
-// follow.
+// The shared corners of two triangles: the first `count` of ia and ib are shared, the rest follow.
 struct SharedCorners {
   int count = 0;
   std::array<int, 3> ia{}, ib{};
@@ -43,15 +41,15 @@ int side_of(const Corners& plane, const Eigen::Vector3d& point) {
   return orientation(plane[0], plane[1], plane[2], point);
 }
 
-// True if all of t lies strictly on one side of the plane of s.
+// Returns true if all of t lies strictly on one side of the plane of s.
 bool apart(const Corners& s, const Corners& t) {
   const int first = side_of(s, t[0]);
   return first != 0 && side_of(s, t[1]) == first && side_of(s, t[2]) == first;
 }
 
-// Two triangles that share corner v meet elsewhere if and only if the side opposite to v of one meets the
-// other: where they share a second point they share the whole ray from v to it as far as both reach, and the
-// end of that is on the side opposite to v of the one that ends first.
+// Two triangles that share corner v intersect elsewhere if and only if the side opposite to v of one
+// intersects the other: if they share a second point they share the ray from v through it within both, and
+// its end is on the side opposite to v of the triangle that ends first.
 bool meet_beyond_corner(const Corners& a, const Corners& b, const SharedCorners& s) {
   const Eigen::Vector3d &a1 = a[s.ia[1]], &a2 = a[s.ia[2]], &b1 = b[s.ib[1]], &b2 = b[s.ib[2]];
   if (side_of(b, a1) * side_of(b, a2) > 0 || side_of(a, b1) * side_of(a, b2) > 0) return false;
@@ -62,6 +60,9 @@ bool fold_together(const Corners& a, const Corners& b, const SharedCorners& s) {
   const Eigen::Vector3d &p = a[s.ia[0]], &q = a[s.ia[1]], &r = a[s.ia[2]], &t = b[s.ib[2]];
   return orientation(p, q, r, t) == 0 && same_side(p, q, r, t);
 }
+
+// How two triangles of a mesh intersect beyond their shared corners.
+enum class PairKind { none, disjoint, vertex_sharing, edge_sharing };
 
 PairKind classify(const Triangle& ia, const Corners& a, const Triangle& ib, const Corners& b) {
   const SharedCorners s = shared_corners(ia, ib);
@@ -77,39 +78,41 @@ PairKind classify(const Triangle& ia, const Corners& a, const Triangle& ib, cons
   }
 }
 
-struct Offence {
+struct Intersection {
   std::uint32_t first, second;  // triangles, first < second
   Eigen::Vector3d point;
-  bool operator<(const Offence& o) const { return first != o.first ? first < o.first : second < o.second; }
+  bool operator<(const Intersection& o) const {
+    return first != o.first ? first < o.first : second < o.second;
+  }
 };
 
 struct Found {
   std::int64_t disjoint = 0, vertex_sharing = 0, edge_sharing = 0;
-  std::vector<Offence> offences;  // at least the kMaxPlaces smallest
+  std::vector<Intersection> list;  // at least the kMaxPlaces smallest
 
-  void add(PairKind kind, const Offence& offence) {
+  void add(PairKind kind, const Intersection& intersection) {
     disjoint += kind == PairKind::disjoint;
     vertex_sharing += kind == PairKind::vertex_sharing;
     edge_sharing += kind == PairKind::edge_sharing;
-    offences.push_back(offence);
-    if (offences.size() >= 16 * kMaxPlaces) keep_smallest();
+    list.push_back(intersection);
+    if (list.size() >= 16 * kMaxPlaces) keep_smallest();
   }
   void append(const Found& o) {
     disjoint += o.disjoint;
     vertex_sharing += o.vertex_sharing;
     edge_sharing += o.edge_sharing;
-    offences.insert(offences.end(), o.offences.begin(), o.offences.end());
+    list.insert(list.end(), o.list.begin(), o.list.end());
     keep_smallest();
   }
   void keep_smallest() {
-    std::sort(offences.begin(), offences.end());
-    if (offences.size() > kMaxPlaces) offences.resize(kMaxPlaces);
+    std::sort(list.begin(), list.end());
+    if (list.size() > kMaxPlaces) list.resize(kMaxPlaces);
   }
 };
 
-class CrossingSearch {
+class IntersectionSearch {
  public:
-  CrossingSearch(const TriangleSoup& soup, const TriangleTree& tree)
+  IntersectionSearch(const TriangleSoup& soup, const TriangleTree& tree)
       : soup_(soup), tree_(tree), boxes_(tree.size()), degenerate_(tree.size()) {
     tbb::parallel_for(tbb::blocked_range<std::size_t>(0, tree.size(), 4096), [this](const auto& range) {
       for (std::size_t slot = range.begin(); slot < range.end(); ++slot) {
@@ -150,34 +153,24 @@ class CrossingSearch {
 
 }  // namespace
 
-PairKind classify_pair(const TriangleSoup& soup, std::size_t a, std::size_t b) {
-  return classify(soup.triangles[a], soup.corners(a), soup.triangles[b], soup.corners(b));
-}
-
 SelfIntersections find_self_intersections(const TriangleSoup& soup, const TriangleTree& tree,
                                           RunContext& context) {
-  const CrossingSearch search(soup, tree);
-  const auto search_range = [&](const tbb::blocked_range<std::size_t>& range, Found found) {
-    for (std::size_t leaf = range.begin(); leaf < range.end(); ++leaf) {
-      context.check();
-      search.search_leaf(leaf, found);
-    }
-    return found;
-  };
-  const auto join = [](Found left, const Found& right) {
-    left.append(right);
-    return left;
-  };
-  const tbb::blocked_range<std::size_t> all(0, tree.leaves(), 256);
-  Found found = tbb::parallel_deterministic_reduce(all, Found{}, search_range, join);
+  const IntersectionSearch search(soup, tree);
+  Found found =
+      sum_ranges<Found>(tree.leaves(), 256, context, [&](std::size_t begin, std::size_t end, Found& sum) {
+        for (std::size_t leaf = begin; leaf < end; ++leaf) {
+          context.check();
+          search.search_leaf(leaf, sum);
+        }
+      });
   found.keep_smallest();
   SelfIntersections result;
   result.disjoint = found.disjoint;
   result.vertex_sharing = found.vertex_sharing;
   result.edge_sharing = found.edge_sharing;
   result.pairs = found.disjoint + found.vertex_sharing + found.edge_sharing;
-  for (const Offence& o : found.offences)
-    add_place(result.places, o.point, soup.polygon(o.first), soup.polygon(o.second));
+  for (const Intersection& o : found.list)
+    result.places.add(o.point, soup.polygon(o.first), soup.polygon(o.second));
   return result;
 }
 

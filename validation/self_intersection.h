@@ -1,4 +1,4 @@
-// All pairs of triangles that meet where they should not, by exact predicates.
+// All pairs of triangles that intersect beyond their shared corners, by exact predicates.
 #pragma once
 
 #include "validation/geometry/triangle_soup.h"
@@ -7,23 +7,17 @@
 
 namespace hermesh::validation {
 
-/// How two triangles of a mesh meet beyond what their shared corners explain.
-enum class PairKind { none, disjoint, vertex_sharing, edge_sharing };
-
-/// Tells how triangles `a` and `b` of the soup, which must not be degenerate, meet. Corners are shared by
-/// number: two points at one position are two points, and triangles that touch there count.
-///  - no shared corner: the closed triangles meet, if only in a point (disjoint);
-///  - one: they meet anywhere but in that corner (vertex_sharing);
-///  - two: they lie in one plane, on the same side of the edge (edge_sharing: a fold). Any other two
-///    triangles meet in the edge alone;
+/// Tests every pair of triangles whose boxes overlap; `tree` is that of the soup. The halves of a quad are
+/// triangles like any others. Corners are shared by number: two points at one position are two points, and
+/// triangles that touch there count. Two triangles intersect if they share
+///  - no corner, and have any point in common (disjoint);
+///  - one, and have a point other than that corner in common (vertex_sharing);
+///  - two, and lie in one plane on the same side of their edge (edge_sharing: a fold). Any other two such
+///    triangles have only the edge in common;
 ///  - three: they are the same triangle (edge_sharing).
-/// A triangle of exactly zero area meets nothing here: it is counted as degenerate, and the edges that it
-/// consists of are those of its neighbours.
-PairKind classify_pair(const TriangleSoup& soup, std::size_t a, std::size_t b);
-
-/// Tests every pair of triangles whose boxes meet; `tree` is that of the soup. A quad's two halves are
-/// triangles like any others. The places are those of the ten pairs that come first by triangle number: the
-/// centre of the overlap of the two boxes.
+/// A triangle of exactly zero area intersects nothing here: it is counted as degenerate, and its edges are
+/// those of its neighbours. The reported locations are the centres of the overlap of the two boxes,
+/// for the first ten pairs by triangle number. @throws Cancelled.
 SelfIntersections find_self_intersections(const TriangleSoup& soup, const TriangleTree& tree,
                                           RunContext& context);
 

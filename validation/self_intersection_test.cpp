@@ -11,7 +11,7 @@
 #include "validation/geometry/test_meshes.h"
 
 namespace hermesh::validation {
-namespace {
+namespace self_intersection_test {
 
 using namespace test;
 
@@ -21,8 +21,8 @@ SelfIntersections search(const MeshFile& mesh) {
   return find_self_intersections(soup, TriangleTree(soup), context);
 }
 
-// The slow and certain way: constructs the intersection of every two triangles in exact arithmetic and looks
-// whether it is more than what their shared corners span. Has no code in common with the judge.
+// Slow oracle without common code: constructs the intersection of every two triangles in exact arithmetic and
+// tests if it exceeds the span of their shared corners.
 using Exact = CGAL::Exact_predicates_exact_constructions_kernel;
 
 Exact::Point_3 exact(const Eigen::Vector3d& p) { return {p.x(), p.y(), p.z()}; }
@@ -230,5 +230,5 @@ TEST(SelfIntersection, CanBeCancelled) {
   EXPECT_THROW(find_self_intersections(soup, TriangleTree(soup), context), Cancelled);
 }
 
-}  // namespace
+}  // namespace self_intersection_test
 }  // namespace hermesh::validation

@@ -1,9 +1,5 @@
 #include "validation/solid_comparison.h"
 
-#include <tbb/blocked_range.h>
-#include <tbb/parallel_reduce.h>
-
-#include <Eigen/Geometry>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -11,7 +7,8 @@
 #include <utility>
 
 #include "algorithms/core/disjoint_sets.h"
-#include "validation/geometry/surface_samples.h"
+#include "validation/geometry/distance.h"
+#include "validation/geometry/sum_ranges.h"
 #include "validation/outer_boundary.h"
 #include "validation/solid.h"
 
@@ -22,8 +19,8 @@ constexpr double kDeviations = 3.0;
 constexpr double kFalseShare = 0.001, kLostShare = 0.01, kVolumeShare = 0.005;
 constexpr double kTimesDistance = 3.0, kLongestShare = 1.0 / 16;
 
-/// A number in [0, 1) that the counter alone decides (Steele, Lea and Flood, Fast Splittable Pseudorandom
-/// Number Generators, 2014), so that points do not depend on threads.
+/// Returns a number in [0, 1) that depends only on the counter (Steele, Lea and Flood, Fast Splittable
+/// Pseudorandom Number Generators, 2014), so that points do not depend on threads.
 double random_fraction(std::uint64_t counter) {
   std::uint64_t z = (counter + 1) * 0x9e3779b97f4a7c15u;
   z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9u;
@@ -31,13 +28,13 @@ double random_fraction(std::uint64_t counter) {
   return double((z ^ (z >> 31)) >> 11) * 0x1p-53;
 }
 
-/// The share of hits among the samples, with Wilson's interval, times `whole`.
+/// Returns the share of hits among the samples, with Wilson's interval, times `whole`.
 Estimate estimate(std::int64_t hits, std::int64_t samples, double whole) {
   if (samples == 0) return {};
   const double n = double(samples), p = double(hits) / n, z = kDeviations;
   const double centre = (p + z * z / (2.0 * n)) / (1.0 + z * z / n);
   const double half = z / (1.0 + z * z / n) * std::sqrt(p * (1.0 - p) / n + z * z / (4.0 * n * n));
-  // Of no hits the lower end is 0 and of nothing else the upper end is 1; rounding would leave a trace.
+  // The ends for no hits and for all hits are exact, without rounding errors.
   return {whole * p, hits == 0 ? 0.0 : whole * std::max(0.0, centre - half),
           hits == samples ? whole : whole * std::min(1.0, centre + half)};
 }
@@ -69,20 +66,12 @@ struct InSpace {
   }
 };
 
-/// Sums add(i, sum) over i < count, in ranges that do not depend on threads.
+/// Sums add(i, sum) over i < count.
 template <class Sum, class Add>
 Sum sum_over(std::int64_t count, const Add& add, const RunContext& context) {
-  const auto add_range = [&](const tbb::blocked_range<std::int64_t>& range, Sum sum) {
-    context.check();
-    for (std::int64_t i = range.begin(); i < range.end(); ++i) add(i, sum);
-    return sum;
-  };
-  const auto join = [](Sum left, const Sum& right) {
-    left.append(right);
-    return left;
-  };
-  return tbb::parallel_deterministic_reduce(tbb::blocked_range<std::int64_t>(0, count, 256), Sum{}, add_range,
-                                            join);
+  return sum_ranges<Sum>(std::size_t(count), 256, context, [&](std::size_t begin, std::size_t end, Sum& sum) {
+    for (std::size_t i = begin; i < end; ++i) add(std::int64_t(i), sum);
+  });
 }
 
 /// A mesh with its soup, tree and solid, which refer to one another.
@@ -97,7 +86,7 @@ struct Body {
   Body(const Body&) = delete;
 };
 
-/// A surface whose distance is asked for; it may have no triangles.
+/// A surface for distance queries; it may have no triangles.
 struct Surface {
   TriangleSoup soup;
   std::optional<TriangleTree> tree;
@@ -105,34 +94,23 @@ struct Surface {
   explicit Surface(const MeshFile& mesh) : soup(mesh) {
     if (!soup.triangles.empty()) tree.emplace(soup);
   }
-  bool beyond(const Eigen::Vector3d& point, double way) const {
-    return !tree || tree->closest(point).squared > way * way;
+  bool beyond(const Eigen::Vector3d& point, double limit) const {
+    return !tree || tree->closest(point).squared > limit * limit;
   }
 };
 
-std::int64_t components_of_triangles(const MeshFile& mesh) {
-  DisjointSets sets(mesh.points.size());
-  const TriangleSoup soup(mesh);
+std::int64_t components_of_triangles(const TriangleSoup& soup) {
+  DisjointSets sets(soup.points.size());
   for (const Triangle& t : soup.triangles) sets.join(sets.join(t[0], t[1]), t[2]);
-  std::vector<std::uint8_t> counted(mesh.points.size(), 0);
+  std::vector<std::uint8_t> counted(soup.points.size(), 0);
   std::int64_t components = 0;
   for (const Triangle& t : soup.triangles) components += !std::exchange(counted[sets.find(t[0])], 1);
   return components;
 }
 
-double area_of(const MeshFile& mesh) {
-  const TriangleSoup soup(mesh);
-  double area = 0.0;
-  for (std::size_t t = 0; t < soup.triangles.size(); ++t) {
-    const Corners c = soup.corners(t);
-    area += 0.5 * (c[1] - c[0]).cross(c[2] - c[0]).norm();
-  }
-  return area;
-}
-
 }  // namespace
 
-/// The reference's solid and boundary, which do not depend on the mesh that is compared.
+/// The reference's solid and boundary, which do not depend on the compared mesh.
 struct SolidReference::Parts {
   Body body;
   OuterBoundary boundary;
@@ -166,8 +144,8 @@ class SolidReference::Comparison {
     result_.reference_area = boundary_.area;
     result_.possible_area = boundary_.possible_area;
     result_.reference_components = boundary_.components;
-    if (options_.pieces) result_.mesh_area = area_of(pieces_);
-    result_.explained = explained_way();
+    if (options_.pieces) result_.mesh_area = ours_.soup.area();
+    result_.explained = explained_distance();
     compare_surfaces();
     compare_space();
     result_.verdict = verdict();
@@ -175,7 +153,7 @@ class SolidReference::Comparison {
   }
 
  private:
-  double explained_way() const {
+  double explained_distance() const {
     const Box& box = reference_.tree.bounds();
     const double least = 1.5 * boundary_.finest;
     if (options_.voxel_size > 0.0) return std::max(least, std::sqrt(3.0) * options_.voxel_size);
@@ -192,22 +170,22 @@ class SolidReference::Comparison {
     return std::max(least, std::min(kTimesDistance * std::sqrt(farthest.squared), kLongestShare * longest));
   }
 
-  /// Whether the places `explained` off a triangle, on its two sides at a point of it, are both inside or
-  /// both outside of the other solid.
+  /// Returns true if the two points at the distance `explained` in front of and behind a point of a triangle
+  /// are both inside or both outside of the other solid.
   bool alike_about(const Eigen::Vector3d& point, const Corners& on, const Solid& solid) const {
-    const Eigen::Vector3d step = result_.explained * (on[1] - on[0]).cross(on[2] - on[0]).stableNormalized();
+    const Eigen::Vector3d step = result_.explained * area_vector(on).stableNormalized();
     const Side front = solid.side(point + step), back = solid.side(point - step);
     return front == back && front != Side::unknown;
   }
 
   void compare_surfaces() {
-    const double way = result_.explained;
+    const double limit = result_.explained;
     const SurfaceSamples ours(ours_.soup, options_.samples), theirs(bounding_.soup, options_.samples);
     const Hits false_ones = sum_over<Hits>(
         ours.size(),
         [&](std::int64_t i, Hits& hits) {
           const Eigen::Vector3d p = ours[i];
-          hits.add(bounding_.beyond(p, way) && possible_.beyond(p, way) &&
+          hits.add(bounding_.beyond(p, limit) && possible_.beyond(p, limit) &&
                        alike_about(p, ours_.soup.corners(ours.triangle(i)), reference_.solid),
                    p);
         },
@@ -216,9 +194,9 @@ class SolidReference::Comparison {
         theirs.size(),
         [&](std::int64_t i, Hits& hits) {
           const Eigen::Vector3d p = theirs[i];
-          hits.add(
-              ours_.beyond(p, way) && alike_about(p, bounding_.soup.corners(theirs.triangle(i)), mesh_.solid),
-              p);
+          hits.add(ours_.beyond(p, limit) &&
+                       alike_about(p, bounding_.soup.corners(theirs.triangle(i)), mesh_.solid),
+                   p);
         },
         context_);
     result_.false_area = estimate(false_ones.hits, false_ones.samples, result_.mesh_area);
@@ -257,8 +235,8 @@ class SolidReference::Comparison {
     result_.difference.upper = volume(at_most).upper;
   }
 
-  /// The number of strata along each side of the box, so that they are nearly cubes and about as many as
-  /// samples; 1 along a side where the box is thin.
+  /// Returns the number of strata along each side of the box, so that they are nearly cubes and about as many
+  /// as samples; 1 along a side in which the box is thin.
   Eigen::Vector3d strata_along(const Eigen::Vector3d& size) const {
     Eigen::Vector3d strata = Eigen::Vector3d::Ones();
     std::array<bool, 3> thin{size.x() <= 0.0, size.y() <= 0.0, size.z() <= 0.0};
@@ -284,9 +262,9 @@ class SolidReference::Comparison {
     sum.reference.add(theirs == Side::inside, point);
     sum.unknown.add(unknown, point);
     sum.difference.add(differs, point);
-    const double way = result_.explained;
+    const double limit = result_.explained;
     const auto far = [&] {
-      return ours_.beyond(point, way) || (bounding_.beyond(point, way) && possible_.beyond(point, way));
+      return ours_.beyond(point, limit) || (bounding_.beyond(point, limit) && possible_.beyond(point, limit));
     };
     sum.unexplained.add(differs && far(), point);
   }
@@ -315,7 +293,7 @@ class SolidReference::Comparison {
 
 SolidReference::SolidReference(const MeshFile& reference, RunContext& context) {
   const Stage stage(context, "reference's solid");
-  MeshFile welded = welded_triangles(reference, QuadRule::better);
+  MeshFile welded = welded_triangles(TriangleSoup(reference, QuadRule::better));
   if (!welded.triangles.empty()) parts_ = std::make_unique<const Parts>(std::move(welded), context);
 }
 
@@ -326,9 +304,10 @@ SolidComparison SolidReference::compare(const MeshFile& mesh, const SolidOptions
   const Stage stage(context, "solids");
   SolidComparison result;
   result.samples = options.samples;
-  result.mesh_components = components_of_triangles(mesh);
-  result.mesh_area = area_of(mesh);
-  MeshFile welded = welded_triangles(mesh);
+  const TriangleSoup soup(mesh);
+  result.mesh_components = components_of_triangles(soup);
+  result.mesh_area = soup.area();
+  MeshFile welded = welded_triangles(soup);
   if (!parts_ || welded.triangles.empty()) return result;
   const Body body(std::move(welded), Solid::Reading::by_orientation, context);
   return Comparison(body, *parts_, options, context).run(result);

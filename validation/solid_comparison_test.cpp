@@ -12,7 +12,7 @@
 #include "validation/outer_boundary.h"
 
 namespace hermesh::validation {
-namespace {
+namespace solid_comparison_test {
 
 using namespace test;
 using Eigen::Vector3d;
@@ -21,12 +21,6 @@ using Verdict = SolidComparison::Verdict;
 MeshFile box(const Vector3d& lower, const Vector3d& upper) {
   MeshFile mesh = cube_of_quads();
   for (Vector3d& p : mesh.points) p = lower + p.cwiseProduct(upper - lower);
-  return mesh;
-}
-
-MeshFile turned_over(MeshFile mesh) {
-  for (Triangle& t : mesh.triangles) std::swap(t[0], t[1]);
-  for (Quad& q : mesh.quads) std::swap(q[1], q[3]);
   return mesh;
 }
 
@@ -117,7 +111,7 @@ SolidComparison compared(const MeshFile& mesh, const MeshFile& reference, double
 }
 
 OuterBoundary boundary_of(const MeshFile& mesh) {
-  const MeshFile welded = welded_triangles(mesh);
+  const MeshFile welded = welded_triangles(TriangleSoup(mesh));
   const TriangleSoup soup(welded);
   const TriangleTree tree(soup);
   const RunContext context;
@@ -135,10 +129,10 @@ TEST(SolidComparison, ThreeSolidsAreNotTheOneThatTheirWallsLieIn) {
       together(together(box({0, 0, 0}, {10, 10, 20 - gap}), box({0, 0, 20 + gap}, {10, 10, 30 - gap})),
                box({0, 0, 30 + gap}, {10, 10, 60}));
   const MeshFile reference = overlapping_boxes();
-  JudgeOptions options;
+  CheckOptions options;
   options.reference = &reference;
   RunContext context;
-  const MeshReport r = judge(three, options, context);
+  const MeshReport r = check_mesh(three, options, context);
   EXPECT_TRUE(r.watertight());
   EXPECT_LE(r.to_reference->max, gap + 1e-12);  // which is why distances are blind to it
   ASSERT_TRUE(r.solid);
@@ -147,7 +141,7 @@ TEST(SolidComparison, ThreeSolidsAreNotTheOneThatTheirWallsLieIn) {
   EXPECT_EQ(r.solid->reference_components, 1);
   EXPECT_NEAR(r.solid->mesh_area, 2600 + 400 - 160 * gap, 1e-6);
   EXPECT_NEAR(r.solid->reference_area, 2600, 1e-3 * 2600);
-  // The four walls without a rim as wide as what is explained.
+  // The four walls without a boundary strip of the width that is explained.
   EXPECT_GT(r.solid->false_area.value, 300);
   EXPECT_LE(r.solid->false_area.lower, 400);
   EXPECT_LE(r.solid->difference.lower, 200 * 2 * gap);
@@ -189,8 +183,8 @@ TEST(OuterBoundary, OfSoupsThatHideWalls) {
   expect(together(box({0, 0, 0}, {10, 10, 20}), box({0, 0, 30}, {10, 10, 60})), 1000 + 1400, 2);
   expect(together(box({0, 0, 0}, {10, 10, 10}), box({2, 2, 2}, {5, 5, 5})), 600, 1);     // buried
   expect(together(box({0, 0, 0}, {10, 10, 10}), box({0, 0, 0}, {10, 10, 10})), 600, 1);  // twice
-  expect(turned_over(box({0, 0, 0}, {10, 10, 10})), 600, 1);
-  expect(together(box({0, 0, 0}, {10, 10, 10}), turned_over(box({20, 0, 0}, {30, 10, 10}))), 1200, 2);
+  expect(reversed(box({0, 0, 0}, {10, 10, 10})), 600, 1);
+  expect(together(box({0, 0, 0}, {10, 10, 10}), reversed(box({20, 0, 0}, {30, 10, 10}))), 1200, 2);
   // A cross of two bars, 36 above and below and 40 long around.
   expect(together(box({0, 4, 4}, {10, 6, 6}), box({4, 0, 4}, {6, 10, 6})), 2 * 36 + 2 * 40, 1);
   // One wall across without a second side, on points of its own and on the box's.
@@ -219,13 +213,13 @@ TEST(OuterBoundary, OfBricksIsTheirUnionsHoweverTheyAreTurned) {
 
 TEST(OuterBoundary, AVoidsWallIsPossible) {
   const OuterBoundary b =
-      boundary_of(together(box({0, 0, 0}, {10, 10, 10}), turned_over(box({2, 2, 2}, {5, 5, 5}))));
+      boundary_of(together(box({0, 0, 0}, {10, 10, 10}), reversed(box({2, 2, 2}, {5, 5, 5}))));
   EXPECT_NEAR(b.area, 600, 1e-9);
   EXPECT_NEAR(b.possible_area, 54, 1e-9);
 }
 
 TEST(SolidComparison, AVoidMayBeKeptOrFilled) {
-  const MeshFile soup = together(box({0, 0, 0}, {10, 10, 10}), turned_over(box({2, 2, 2}, {8, 8, 8})));
+  const MeshFile soup = together(box({0, 0, 0}, {10, 10, 10}), reversed(box({2, 2, 2}, {8, 8, 8})));
   EXPECT_NE(compared(soup, soup).verdict, Verdict::differs);
   EXPECT_NE(compared(box({0, 0, 0}, {10, 10, 10}), soup).verdict, Verdict::differs);
   EXPECT_NEAR(compared(soup, soup).unknown_volume.value, 216, 15);
@@ -268,7 +262,7 @@ TEST(SolidComparison, LostAndAddedPartsAreFound) {
   EXPECT_GT(compared(body, with_fin, 1.0).lost_area.lower, 0.0);
   EXPECT_EQ(compared(with_fin, body, 0.5).verdict, Verdict::differs);
   // A bubble that the reference does not have.
-  const MeshFile bubble = together(body, turned_over(box({4, 4, 4}, {6, 6, 6})));
+  const MeshFile bubble = together(body, reversed(box({4, 4, 4}, {6, 6, 6})));
   EXPECT_EQ(compared(bubble, body, 0.25).verdict, Verdict::differs);
   EXPECT_EQ(compared(body, body).verdict, Verdict::same);
 }
@@ -291,11 +285,11 @@ TEST(SolidComparison, NeverAFalseVerdictOnOpenOrUnorientedReferences) {
   std::swap(flipped.quads[2][1], flipped.quads[2][3]);
   both.quads.pop_back();
   std::swap(both.quads[2][1], both.quads[2][3]);
-  for (const MeshFile& reference : {open, flipped, both, turned_over(cube), turned_over(open)}) {
+  for (const MeshFile& reference : {open, flipped, both, reversed(cube), reversed(open)}) {
     EXPECT_NE(compared(cube, reference, 0.0, 4'000).verdict, Verdict::differs);
     EXPECT_NE(compared(cube, soup_of_triangles(reference), 0.0, 4'000).verdict, Verdict::differs);
   }
-  // Closed, so that parity tells all of it.
+  // The mesh is closed, so that parity determines the inside everywhere.
   EXPECT_EQ(compared(cube, flipped).verdict, Verdict::same);
   EXPECT_EQ(compared(cube, flipped).unknown_volume.value, 0.0);
   EXPECT_EQ(compared(box({0, 0, 0}, {1, 1, 0.5}), flipped, 0.02).verdict, Verdict::differs);
@@ -308,7 +302,7 @@ TEST(SolidComparison, NeverAFalseVerdictOnOpenOrUnorientedReferences) {
 }
 
 TEST(SolidComparison, AVoidBetweenPartsMayBeFilled) {
-  // Six boards that enclose a room: what winds around nothing is inside for a flood.
+  // Six boards that enclose a room: its winding number is 0, but a flood fill counts it as inside.
   MeshFile boards = box({0, 0, 0}, {10, 10, 1});
   for (const auto& [lower, upper] : {std::pair<Vector3d, Vector3d>{{0, 0, 9}, {10, 10, 10}},
                                      {{0, 0, 1}, {1, 10, 9}},
@@ -317,14 +311,14 @@ TEST(SolidComparison, AVoidBetweenPartsMayBeFilled) {
                                      {{1, 9, 1}, {9, 10, 9}}})
     boards = together(boards, box(lower, upper));
   const MeshFile filled = box({0, 0, 0}, {10, 10, 10});
-  const MeshFile room = together(filled, turned_over(box({1, 1, 1}, {9, 9, 9})));
+  const MeshFile room = together(filled, reversed(box({1, 1, 1}, {9, 9, 9})));
   EXPECT_NE(compared(filled, boards, 0.0, 4'000).verdict, Verdict::differs);
   EXPECT_NE(compared(room, boards, 0.0, 4'000).verdict, Verdict::differs);
 }
 
 TEST(FreeCells, TheFloodComesAroundAndNotInside) {
   const MeshFile mesh = together(box({0, 0, 0}, {10, 10, 10}), box({2, 2, 10}, {5, 5, 30}));
-  const MeshFile welded = welded_triangles(mesh);
+  const MeshFile welded = welded_triangles(TriangleSoup(mesh));
   const TriangleSoup soup(welded);
   const FreeCells cells{TriangleTree(soup)};
   for (const Vector3d& p : {Vector3d(-1, 5, 5), {5, 5, 31}, {8, 8, 20}, {6, 3, 29}, {1, 1, 12}}) {
@@ -371,7 +365,7 @@ TEST(SolidComparison, IsDeterministic) {
   EXPECT_EQ(*c.unexplained_place, *d.unexplained_place);
 }
 
-/// A mesh that no judge should object to: finer than the reference or coarser, with points off by a little,
+/// A correct mesh of a reference: finer than the reference or coarser, with points off by a little,
 /// of a soup or of a smooth surface, turned.
 std::pair<MeshFile, MeshFile> good_pair(int number) {
   std::mt19937 random{std::uint32_t(number)};
@@ -411,8 +405,6 @@ void expect_no_alarm(int first, int last) {
 
 TEST(SolidComparison, NoAlarmOnGoodMeshes) { expect_no_alarm(0, 8); }
 
-}  // namespace
-
 TEST(Slow, NoFalseAlarmInFiveHundredGoodMeshes) {
   std::vector<int> alarms;
   for (int number = 0; number < 500; ++number) {
@@ -422,4 +414,5 @@ TEST(Slow, NoFalseAlarmInFiveHundredGoodMeshes) {
   EXPECT_LE(alarms.size(), 1u) << testing::PrintToString(alarms);
 }
 
+}  // namespace solid_comparison_test
 }  // namespace hermesh::validation

@@ -1,12 +1,13 @@
 #include "validation/topology.h"
 
-#include <tbb/blocked_range.h>
-#include <tbb/parallel_reduce.h>
-
 #include <algorithm>
+#include <cmath>
+#include <numbers>
 #include <numeric>
 
-#include "validation/geometry/places.h"
+#include "algorithms/core/disjoint_sets.h"
+#include "validation/geometry/exact_predicates.h"
+#include "validation/geometry/sum_ranges.h"
 
 namespace hermesh::validation {
 namespace {
@@ -55,8 +56,7 @@ class CornerIndex {
   std::size_t triangle_corners_;
 };
 
-// The corners at each point, in increasing order: those of point v are corner[first[v]] to corner[first[v +
-// 1]].
+// The corners at each point, in increasing order: those of point v begin at corner[first[v]].
 struct Incidence {
   std::vector<std::uint32_t> first, corner;
 
@@ -68,7 +68,7 @@ struct Incidence {
   }
 };
 
-// What a range of points contributes.
+// The counts of a range of points.
 struct Tally {
   std::int64_t edges = 0, boundary = 0, non_manifold = 0, inconsistent = 0, singular = 0, duplicates = 0,
                isolated = 0;
@@ -82,15 +82,15 @@ struct Tally {
     singular += later.singular;
     duplicates += later.duplicates;
     isolated += later.isolated;
-    append_places(boundary_places, later.boundary_places);
-    append_places(non_manifold_places, later.non_manifold_places);
-    append_places(inconsistent_places, later.inconsistent_places);
-    append_places(singular_places, later.singular_places);
-    append_places(duplicate_places, later.duplicate_places);
+    boundary_places.append(later.boundary_places);
+    non_manifold_places.append(later.non_manifold_places);
+    inconsistent_places.append(later.inconsistent_places);
+    singular_places.append(later.singular_places);
+    duplicate_places.append(later.duplicate_places);
   }
 };
 
-// Counts what lies at one point after another, keeping its scratch memory.
+// Counts the defects at one point after another, reusing its scratch memory.
 class PointCounter {
  public:
   PointCounter(const MeshFile& mesh, const CornerIndex& corners, const Incidence& incidence, Tally& tally)
@@ -110,7 +110,7 @@ class PointCounter {
   }
 
  private:
-  // A side at the point: towards or from another point, by the polygon of the point's corner number `local`.
+  // A side at the point, to or from another point, of the polygon of the point's corner number `local`.
   struct Side {
     std::uint32_t other, local;
     bool outgoing;
@@ -138,7 +138,7 @@ class PointCounter {
     return i;
   }
 
-  // Each group of sides with one other end is an edge; it is counted at its lower end and joins fans at both.
+  // The sides with one other end are an edge, which is counted at its lower end and joins fans at both.
   void count_edges(std::uint32_t v) {
     for (std::size_t i = 0, end; i < sides_.size(); i = end) {
       int outgoing = 0;
@@ -159,13 +159,13 @@ class PointCounter {
     const std::int64_t one = polygon(sides_[first].local);
     if (sides == 1) {
       ++tally_.boundary;
-      add_place(tally_.boundary_places, middle, one);
+      tally_.boundary_places.add(middle, one);
     } else if (sides > 2) {
       ++tally_.non_manifold;
-      add_place(tally_.non_manifold_places, middle, one, polygon(sides_[first + 1].local));
+      tally_.non_manifold_places.add(middle, one, polygon(sides_[first + 1].local));
     } else {
       ++tally_.inconsistent;
-      add_place(tally_.inconsistent_places, middle, one, polygon(sides_[first + 1].local));
+      tally_.inconsistent_places.add(middle, one, polygon(sides_[first + 1].local));
     }
   }
 
@@ -176,10 +176,10 @@ class PointCounter {
       if (fan_[i] == i) roots[fans++] = i;
     if (fans < 2) return;
     ++tally_.singular;
-    add_place(tally_.singular_places, mesh_.points[v], polygon(roots[0]), polygon(roots[1]));
+    tally_.singular_places.add(mesh_.points[v], polygon(roots[0]), polygon(roots[1]));
   }
 
-  // A polygon is looked at in the list of its lowest point only.
+  // Tests each polygon in the list of its lowest point only.
   void count_duplicates(std::uint32_t v) {
     if (count_ < 2) return;
     keys_.clear();
@@ -199,7 +199,7 @@ class PointCounter {
       ++tally_.duplicates;
       const auto& p = keys_[i].first;
       const Eigen::Vector3d centre = (mesh_.points[p[0]] + mesh_.points[p[1]] + mesh_.points[p[2]]) / 3.0;
-      add_place(tally_.duplicate_places, centre, keys_[first].second, keys_[i].second);
+      tally_.duplicate_places.add(centre, keys_[first].second, keys_[i].second);
     }
   }
 
@@ -215,40 +215,55 @@ class PointCounter {
   std::vector<std::pair<std::array<std::uint32_t, 4>, std::int64_t>> keys_;
 };
 
-Tally tally_points(const MeshFile& mesh, const CornerIndex& corners, const RunContext& context) {
-  const Incidence incidence(corners, mesh.points.size());
-  const auto count_range = [&](const tbb::blocked_range<std::size_t>& range, Tally tally) {
-    context.check();
-    PointCounter counter(mesh, corners, incidence, tally);
-    for (std::size_t v = range.begin(); v < range.end(); ++v) counter.count(std::uint32_t(v));
-    return tally;
-  };
-  const auto join = [](Tally left, const Tally& right) {
-    left.append(right);
-    return left;
-  };
-  const tbb::blocked_range<std::size_t> all(0, mesh.points.size(), 8192);
-  return tbb::parallel_deterministic_reduce(all, Tally{}, count_range, join);
+std::int64_t count_components(const MeshFile& mesh) {
+  DisjointSets sets(mesh.points.size());
+  for (const Triangle& t : mesh.triangles) sets.join(t[0], t[1]), sets.join(t[0], t[2]);
+  for (const Quad& q : mesh.quads) sets.join(q[0], q[1]), sets.join(q[0], q[2]), sets.join(q[0], q[3]);
+  std::int64_t components = 0;  // including one for each isolated point
+  for (std::uint32_t p = 0; p < sets.size(); ++p) components += sets.find(p) == p;
+  return components;
 }
 
-std::int64_t count_components(const MeshFile& mesh) {
-  std::vector<std::uint32_t> parent(mesh.points.size());
-  std::iota(parent.begin(), parent.end(), 0u);
-  const auto root = [&parent](std::uint32_t i) {
-    while (parent[i] != i) i = parent[i] = parent[parent[i]];
-    return i;
-  };
-  std::int64_t joins = 0;
-  const auto join = [&](std::uint32_t a, std::uint32_t b) {
-    a = root(a), b = root(b);
-    joins += a != b;
-    parent[std::max(a, b)] = std::min(a, b);
-  };
-  for (const Triangle& t : mesh.triangles) join(t[0], t[1]), join(t[0], t[2]);
-  for (const Quad& q : mesh.quads) join(q[0], q[1]), join(q[0], q[2]), join(q[0], q[3]);
-  // Isolated points are components of their own here; the caller takes them off.
-  return std::int64_t(mesh.points.size()) - joins;
-}
+struct MeasureSums {
+  double volume = 0.0, area = 0.0;
+  double smallest_angle = 180.0, worst_aspect = 0.0;
+  std::int64_t degenerate = 0;
+  std::int64_t last_degenerate = -1;  // its polygon, so that a quad counts once
+  Places places;
+
+  void add(const Corners& c, const Eigen::Vector3d& centre, std::int64_t polygon) {
+    const Eigen::Vector3d ab = c[1] - c[0], bc = c[2] - c[1], ca = c[0] - c[2];
+    const double twice_area = ab.cross(-ca).norm();
+    area += 0.5 * twice_area;
+    volume += (c[0] - centre).dot((c[1] - centre).cross(c[2] - centre)) / 6.0;
+    if (collinear(c)) {
+      if (polygon != last_degenerate) {
+        ++degenerate;
+        places.add((c[0] + c[1] + c[2]) / 3.0, polygon);
+      }
+      last_degenerate = polygon;
+      smallest_angle = 0.0;
+      worst_aspect = std::numeric_limits<double>::infinity();
+      return;
+    }
+    std::array<double, 3> side{ab.norm(), bc.norm(), ca.norm()};
+    std::sort(side.begin(), side.end());
+    // The smallest angle is opposite to the shortest side; its sine is twice the area over the other two.
+    const double cosine = (side[1] * side[1] + side[2] * side[2] - side[0] * side[0]) / 2.0;
+    smallest_angle = std::min(smallest_angle, std::atan2(twice_area, cosine) * 180.0 / std::numbers::pi);
+    const double perimeter = side[0] + side[1] + side[2];
+    worst_aspect = std::max(worst_aspect, side[2] * perimeter / (2.0 * std::numbers::sqrt3 * twice_area));
+  }
+
+  void append(const MeasureSums& later) {
+    volume += later.volume;
+    area += later.area;
+    smallest_angle = std::min(smallest_angle, later.smallest_angle);
+    worst_aspect = std::max(worst_aspect, later.worst_aspect);
+    degenerate += later.degenerate;
+    places.append(later.places);
+  }
+};
 
 }  // namespace
 
@@ -263,7 +278,13 @@ void count_topology(const MeshFile& mesh, MeshReport& report, RunContext& contex
   if (corners.size() >= CornerIndex::kNone)
     throw Error("the mesh has more polygon corners than can be counted (" + std::to_string(corners.size()) +
                 ")");
-  const Tally tally = tally_points(mesh, corners, context);
+  const Incidence incidence(corners, mesh.points.size());
+  const Tally tally = sum_ranges<Tally>(mesh.points.size(), 8192, context,
+                                        [&](std::size_t begin, std::size_t end, Tally& sum) {
+                                          PointCounter counter(mesh, corners, incidence, sum);
+                                          for (std::size_t v = begin; v < end; ++v)
+                                            counter.count(std::uint32_t(v));
+                                        });
   report.points = std::int64_t(mesh.points.size());
   report.triangles = std::int64_t(mesh.triangles.size());
   report.quads = std::int64_t(mesh.quads.size());
@@ -281,12 +302,31 @@ void count_topology(const MeshFile& mesh, MeshReport& report, RunContext& contex
   report.components = count_components(mesh) - tally.isolated;
   report.euler_characteristic =
       report.points - tally.isolated - tally.edges + report.triangles + report.quads;
-  const bool repeats =
-      std::any_of(mesh.triangles.begin(), mesh.triangles.end(),
-                  [](const Triangle& t) { return repeats_corner(t); }) ||
-      std::any_of(mesh.quads.begin(), mesh.quads.end(), [](const Quad& q) { return repeats_corner(q); });
-  if (report.closed() && report.manifold() && report.oriented() && !repeats && report.components > 0)
+  const auto repeats = [](const auto& polygon) { return repeats_corner(polygon); };
+  if (report.closed() && report.manifold() && report.oriented() && report.components > 0 &&
+      std::ranges::none_of(mesh.triangles, repeats) && std::ranges::none_of(mesh.quads, repeats))
     report.genus = double(report.components) - 0.5 * double(report.euler_characteristic);
+}
+
+void measure_triangles(const MeshFile& mesh, const TriangleSoup& soup, MeshReport& report,
+                       RunContext& context) {
+  const Eigen::Vector3d centre = box_of(mesh).centre();
+  // Ranges are of polygons, so that none separates the two halves of a quad.
+  const std::size_t undivided = soup.undivided, polygons = undivided + mesh.quads.size();
+  const auto sums = sum_ranges<MeasureSums>(
+      polygons, 4096, context, [&](std::size_t begin, std::size_t end, MeasureSums& sum) {
+        for (std::size_t p = begin; p < end; ++p) {
+          const std::size_t first = p < undivided ? p : undivided + 2 * (p - undivided);
+          for (std::size_t t = first; t < first + (p < undivided ? 1 : 2); ++t)
+            sum.add(soup.corners(t), centre, std::int64_t(p));
+        }
+      });
+  report.volume = sums.volume;
+  report.area = sums.area;
+  report.smallest_angle = polygons > 0 ? sums.smallest_angle : 0.0;
+  report.worst_aspect = sums.worst_aspect;
+  report.degenerate_polygons = sums.degenerate;
+  report.degenerate_places = sums.places;
 }
 
 }  // namespace hermesh::validation

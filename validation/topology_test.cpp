@@ -10,10 +10,9 @@
 
 #include "validation/geometry/test_meshes.h"
 #include "validation/library_counts.h"
-#include "validation/measures.h"
 
 namespace hermesh::validation {
-namespace {
+namespace topology_test {
 
 using namespace test;
 
@@ -71,8 +70,7 @@ TEST(Topology, CubeOfQuads) {
 }
 
 TEST(Topology, CubeOfTrianglesInsideOut) {
-  MeshFile mesh = cube_of_triangles();
-  for (Triangle& t : mesh.triangles) std::swap(t[0], t[1]);
+  const MeshFile mesh = reversed(cube_of_triangles());
   const MeshReport r = counts(mesh);
   expect_no_defect(r);
   EXPECT_EQ(r.triangles, 12);
@@ -325,5 +323,5 @@ TEST(Topology, RandomPolygonsGiveTheSameReportAtAnyThreadCount) {
   }
 }
 
-}  // namespace
+}  // namespace topology_test
 }  // namespace hermesh::validation

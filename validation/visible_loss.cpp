@@ -2,12 +2,11 @@
 
 #include <tbb/parallel_for.h>
 
-#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <vector>
 
-#include "validation/geometry/surface_samples.h"
+#include "validation/geometry/distance.h"
 #include "validation/geometry/triangle_tree.h"
 
 namespace hermesh::validation {
@@ -17,11 +16,11 @@ using Eigen::Vector3d;
 
 constexpr int kEscapes = 16;
 constexpr double kHalf = 0.5, kWhole = 1.0;  // voxels
-constexpr double kSlack = 1.02;  // of these lengths: samples lie where the distance is greatest, too
-constexpr double kOff = 1e-6;    // of the model's diagonal: where rays begin
-constexpr double kFacing = 0.2;  // least cosine between normals that face one side
+constexpr double kSlack = 1.02;  // of these lengths, because samples include the points of greatest distance
+constexpr double kOff = 1e-6;    // of the model's diagonal: distance of a ray's start from the surface
+constexpr double kFacing = 0.2;  // least cosine between normals that face the same side
 
-/// Directions spread evenly over the sphere (a Fibonacci lattice). Neighbours in the list are far apart.
+/// Returns direction i of a Fibonacci lattice on the sphere. Consecutive directions are far apart.
 Vector3d direction(int i) {
   constexpr double kGolden = 2.399963229728653;
   const double z = 1.0 - (2.0 * ((i * 13) % kEscapes) + 1.0) / kEscapes, r = std::sqrt(1.0 - z * z);
@@ -38,7 +37,7 @@ bool meets(const Vector3d& from, const Vector3d& along, const Corners& c) {
   return x >= 0.0 && y >= 0.0 && x + y <= 1.0 && v.dot(q) / slope > 0.0;
 }
 
-/// Wilson's interval of a share, at 95 %.
+/// Returns a share with Wilson's interval at 95 %.
 Estimate share(std::int64_t hits, std::int64_t of) {
   if (of == 0) return {};
   constexpr double kZ = 1.959963984540054;
@@ -57,13 +56,13 @@ class Measurement {
     if (!mesh.triangles.empty()) mesh_tree_.emplace(mesh);
   }
 
-  /// What becomes of a place of the model on a triangle.
+  /// Classifies a point of the model on a triangle.
   Seen look(const Vector3d& at, std::size_t triangle) const {
     const Corners c = model_.corners(triangle);
-    const Vector3d normal = (c[1] - c[0]).cross(c[2] - c[0]).stableNormalized();
+    const Vector3d normal = area_vector(c).stableNormalized();
     Seen result = Seen::hidden;
     for (const double side : {1.0, -1.0}) {
-      // The worse of what is seen of the two sides counts; a side that is hidden does not.
+      // The worse result of the visible sides counts.
       if (result != Seen::vanished && is_visible(at, side * normal))
         result = std::max(result, seen_from(at, side * normal));
     }
@@ -105,7 +104,7 @@ class Measurement {
     box.add(at);
     const bool none = mesh_tree_->for_each_near(box, whole, [&](std::uint32_t slot) {
       const Corners& c = mesh_tree_->corners(slot);
-      const Vector3d facing = (c[1] - c[0]).cross(c[2] - c[0]);
+      const Vector3d facing = area_vector(c);
       if (facing.dot(side) < kFacing * facing.norm()) return true;
       const Vector3d away = closest_point(c, at) - at;
       const double squared = away.squaredNorm();
@@ -113,10 +112,10 @@ class Measurement {
       return squared > half * half && !(in_front && squared <= whole * whole);
     });
     if (!none) return Seen::shown;
-    // Within the mesh if the nearest surface faces away.
+    // The point is within the mesh if the nearest surface faces away.
     const ClosestHit nearest = mesh_tree_->closest(at);
     const Corners& c = mesh_tree_->corners(nearest.slot);
-    return (c[1] - c[0]).cross(c[2] - c[0]).dot(nearest.point - at) > 0.0 ? Seen::filled : Seen::vanished;
+    return area_vector(c).dot(nearest.point - at) > 0.0 ? Seen::filled : Seen::vanished;
   }
 
   const TriangleSoup& model_;
@@ -125,15 +124,6 @@ class Measurement {
   TriangleTree model_tree_;
   std::optional<TriangleTree> mesh_tree_;
 };
-
-double area_of(const TriangleSoup& soup) {
-  double area = 0.0;
-  for (std::size_t t = 0; t < soup.triangles.size(); ++t) {
-    const Corners c = soup.corners(t);
-    area += 0.5 * (c[1] - c[0]).cross(c[2] - c[0]).norm();
-  }
-  return area;
-}
 
 }  // namespace
 
@@ -152,7 +142,7 @@ VisibleLoss measure_visible_loss(const TriangleSoup& model, const TriangleSoup& 
   const auto count = [&](Seen what) { return std::int64_t(std::count(seen.begin(), seen.end(), what)); };
   const std::int64_t filled = count(Seen::filled), vanished = count(Seen::vanished),
                      visible = of_model.size() - count(Seen::hidden);
-  result.visible_area = area_of(model) * double(visible) / double(std::max<std::int64_t>(1, of_model.size()));
+  result.visible_area = model.area() * double(visible) / double(std::max<std::int64_t>(1, of_model.size()));
   result.lost = share(filled + vanished, visible);
   result.vanished = share(vanished, visible);
   result.filled = share(filled, visible);
@@ -166,7 +156,7 @@ VisibleLoss measure_visible_loss(const TriangleSoup& model, const TriangleSoup& 
     invented[std::size_t(i)] = measurement.is_invented(of_mesh[i]);
   });
   result.invented = share(std::count(invented.begin(), invented.end(), 1), of_mesh.size());
-  result.invented_area = result.invented.value * area_of(mesh);
+  result.invented_area = result.invented.value * mesh.area();
   const auto cap = std::find(invented.begin(), invented.end(), 1);
   if (cap != invented.end()) result.invented_place = of_mesh[cap - invented.begin()];
   return result;

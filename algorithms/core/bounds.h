@@ -1,5 +1,4 @@
-// Boxes along the axes, one type for all of algorithms/ and experiments/; the judges of validation/ keep
-// their own.
+// Axis-aligned boxes.
 #pragma once
 
 #include <Eigen/Core>
@@ -7,8 +6,8 @@
 
 namespace hermesh {
 
-/// A box along the axes from `lower` to `upper`, in the unit of what is added to it. Its faces belong to it.
-/// It is empty until something is added.
+/// An axis-aligned box from `lower` to `upper`, in the unit of its points. Its faces belong to it. Empty
+/// until something is added.
 template <class T>
 struct BoundsOf {
   using Vector = Eigen::Matrix<T, 3, 1>;
@@ -19,7 +18,7 @@ struct BoundsOf {
 
   Vector lower = Vector::Constant(kFarthest), upper = Vector::Constant(kLeast);
 
-  /// Returns the box that every point lies in.
+  /// Returns the box that contains every point.
   static BoundsOf unbounded() { return {Vector::Constant(kLeast), Vector::Constant(kFarthest)}; }
 
   void add(const Vector& point) {
@@ -31,15 +30,14 @@ struct BoundsOf {
     upper = upper.cwiseMax(other.upper);
   }
   bool empty() const { return (lower.array() > upper.array()).any(); }
-  /// Whether the two have a point in common. An empty box has none.
+  /// Returns true if the two have a point in common. An empty box has none.
   bool overlaps(const BoundsOf& other) const {
-    // All six are compared: a branch costs more than a comparison, and this is the inner loop of many
-    // searches.
+    // Without branches: this is the inner loop of many searches.
     bool apart = false;
     for (int a = 0; a < 3; ++a) apart |= lower[a] > other.upper[a] || other.lower[a] > upper[a];
     return !apart;
   }
-  /// The lengths of the sides; zero if the box is empty.
+  /// Returns the lengths of the sides; zero if the box is empty.
   Vector size() const { return empty() ? Vector(Vector::Zero()) : Vector(upper - lower); }
 };
 

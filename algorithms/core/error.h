@@ -1,4 +1,4 @@
-// The two ways in which work ends early.
+// Exceptions.
 #pragma once
 
 #include <exception>
@@ -7,19 +7,19 @@
 
 namespace hermesh {
 
-/// Bad input, or a failure that the user can do something about. what() is one sentence that names the file
-/// or the option and says what to do; the command line prints it and exits with 1.
+/// Bad input, or a failure that the user can fix. what() names the file or the option and what to do; the
+/// command line prints it and exits with 1.
 class Error : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-/// Thrown from RunContext::check() once the user has asked to stop. The command line exits with 130.
+/// Thrown by RunContext::check() after a request to stop. The command line exits with 130.
 class Cancelled : public std::exception {
  public:
   const char* what() const noexcept override { return "cancelled"; }
 };
 
-/// Runs `work`; an Error of it that does not name `file` is thrown again with the name in front.
+/// Runs `work`; an Error of it that does not name `file` is rethrown with the name in front.
 template <class Work>
 auto about_file(const std::string& file, Work&& work) {
   try {

@@ -6,7 +6,7 @@
 
 namespace hermesh {
 
-/// Calls f(range) for each longest range of neighboring items that equal the range's first, in order.
+/// Calls f(range) for each maximal range of adjacent items that equal the range's first, in order.
 template <class T, class Equal, class F>
 void for_groups(std::span<const T> items, Equal&& equal, F&& f) {
   for (std::size_t begin = 0, end; begin < items.size(); begin = end) {

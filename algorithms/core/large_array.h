@@ -1,4 +1,4 @@
-// Arrays that are written once, in parallel, straight after they were made.
+// Arrays that are written once, in parallel, directly after their allocation.
 #pragma once
 
 #include <sys/mman.h>
@@ -12,9 +12,9 @@
 
 namespace hermesh {
 
-/// Allocator that leaves new elements uninitialized, so that resizing touches no memory and the first to
-/// write a page is the thread that fills it. Large arrays ask for huge pages: the first touch of a small page
-/// costs more than filling it.
+/// Allocator that leaves new elements uninitialized, so that resizing touches no memory and the thread that
+/// fills a page touches it first. Large arrays request huge pages: the first touch of a small page costs more
+/// than filling it.
 template <class T>
 class LargeArrayAllocator {
  public:
@@ -28,7 +28,7 @@ class LargeArrayAllocator {
     const std::size_t alignment = bytes >= kLarge ? kHugePage : alignof(std::max_align_t);
     void* memory = ::operator new (bytes, std::align_val_t{alignment});
 #if defined(MADV_HUGEPAGE)
-    if (bytes >= kLarge) madvise(memory, bytes, MADV_HUGEPAGE);  // a wish: nothing depends on it
+    if (bytes >= kLarge) madvise(memory, bytes, MADV_HUGEPAGE);  // only a hint: a failure has no effect
 #endif
     return static_cast<T*>(memory);
   }
@@ -49,10 +49,10 @@ class LargeArrayAllocator {
  private:
   static constexpr std::size_t kHugePage = std::size_t{2} << 20;
   static constexpr std::size_t kLarge =
-      2 * kHugePage;  ///< below it what is left of the last page would weigh too much
+      2 * kHugePage;  ///< below it the unused rest of the last page would be too large
 };
 
-/// Vector whose resize() leaves new elements as the memory is: T must have no default member initializer that
+/// Vector whose resize() leaves new elements uninitialized: T must have no default member initializer that
 /// matters.
 template <class T>
 using LargeArray = std::vector<T, LargeArrayAllocator<T>>;

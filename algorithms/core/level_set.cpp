@@ -1,16 +1,16 @@
 #include "algorithms/core/level_set.h"
 
 #include <openvdb/openvdb.h>
+#include <openvdb/tools/Count.h>
 
 #include <cmath>
 #include <mutex>
 
 #include "algorithms/core/level_set_grid.h"
-#include "algorithms/hermite/dense/dense_hermite.h"
 
 namespace hermesh {
 
-// The transform may mirror, which makes the signed volume of a voxel negative: its magnitude counts.
+// The transform may mirror, which makes the signed volume of a voxel negative.
 double LevelSet::voxel_size() const { return std::cbrt(std::abs(grid_->grid->transform().voxelVolume())); }
 
 double LevelSet::background() const { return grid_->grid->background(); }
@@ -24,14 +24,16 @@ std::array<int, 3> LevelSet::dimensions() const {
   return {size.x(), size.y(), size.z()};
 }
 
+std::pair<float, float> value_range(const LevelSet& volume) {
+  const openvdb::FloatTree& tree = volume.grid().grid->tree();
+  if (tree.empty() || !tree.cbeginValueOn()) return {tree.background(), tree.background()};
+  const openvdb::math::MinMax<float> range = openvdb::tools::minMax(tree);
+  return {range.min(), range.max()};
+}
+
 void initialize_openvdb() {
   static std::once_flag once;
-  // Threads that come second wait until all types are there. Our own follow, because openvdb::initialize()
-  // clears the registry of grid types before it fills it.
-  std::call_once(once, [] {
-    openvdb::initialize();
-    register_hermite_grids();
-  });
+  std::call_once(once, [] { openvdb::initialize(); });
 }
 
 }  // namespace hermesh

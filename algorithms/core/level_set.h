@@ -1,4 +1,4 @@
-// The scalar volume between the stages. This header is light; level_set_grid.h has the OpenVDB grid itself.
+// The scalar volume between the stages. Light: level_set_grid.h has the OpenVDB grid.
 #pragma once
 
 #include <array>
@@ -11,8 +11,8 @@ namespace hermesh {
 struct LevelSetGrid;  // level_set_grid.h
 
 /// A sparse scalar grid of floats with its placement. As a level set: signed distance in world units,
-/// negative inside, right within a narrow band and ±background beyond. Copies share the grid, which nobody
-/// changes once it is made.
+/// negative inside, exact within a narrow band and ±background beyond. Copies share the grid, which is
+/// constant once it is made.
 class LevelSet {
  public:
   LevelSet() = default;
@@ -30,5 +30,9 @@ class LevelSet {
  private:
   std::shared_ptr<const LevelSetGrid> grid_;
 };
+
+/// Returns the least and the greatest active value, tiles included; of a volume without active voxels the
+/// background twice.
+std::pair<float, float> value_range(const LevelSet& volume);
 
 }  // namespace hermesh

@@ -1,5 +1,4 @@
-// The OpenVDB grid inside a LevelSet. Heavy (seconds a translation unit): include it from .cpp files that
-// need it.
+// The OpenVDB grid inside a LevelSet. Heavy (seconds per translation unit): include it from .cpp files.
 #pragma once
 
 #include <Eigen/Core>
@@ -14,15 +13,15 @@ struct LevelSetGrid {
   openvdb::FloatGrid::ConstPtr grid;
 };
 
-/// Wraps a grid, which nobody may change from then on.
+/// Wraps a grid, which must not be changed afterwards.
 inline LevelSet make_level_set(openvdb::FloatGrid::ConstPtr grid) {
   return LevelSet(std::make_shared<const LevelSetGrid>(LevelSetGrid{std::move(grid)}));
 }
 
-/// The vector as Eigen has it.
 inline Eigen::Vector3d to_eigen(const openvdb::Vec3d& v) { return {v.x(), v.y(), v.z()}; }
 
-/// Registers OpenVDB's types and ours, once; call it before a grid is made, read or written.
+/// Registers OpenVDB's types, once; call it before a grid is made, read or written.
+/// thesis/voxels/dense_hermite.h registers the types of dense Hermite data.
 void initialize_openvdb();
 
 }  // namespace hermesh

@@ -1,5 +1,5 @@
-// Names of OpenVDB's trees and grids of floats, for headers that only refer to them: OpenVDB's own take
-// seconds to read. Whoever looks into a tree includes openvdb_trees.h besides.
+// Forward declarations of OpenVDB's trees and grids of floats, for headers that only refer to them: OpenVDB's
+// own take seconds to read. Files that access a tree include openvdb_trees.h, too.
 #pragma once
 
 #include <openvdb/version.h>

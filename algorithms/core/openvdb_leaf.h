@@ -1,4 +1,4 @@
-// A leaf of OpenVDB's trees of floats, for files that need no trees: they compile in half the time.
+// A leaf of OpenVDB's trees of floats, for files without trees: they compile in half the time.
 #pragma once
 
 #include <openvdb/tree/LeafNode.h>

@@ -1,7 +1,7 @@
 #include "algorithms/core/openvdb_trees.h"
 
 namespace openvdb::OPENVDB_VERSION_NAME::tree {
-/// LeafNode::str(), which nothing calls, needs it.
+/// Required by LeafNode::str(), which is never called.
 template <class Value, Index kLog2Dim>
 std::ostream& operator<<(std::ostream& out, const LeafBuffer<Value, kLog2Dim>&) {
   return out;

@@ -1,7 +1,6 @@
-// OpenVDB's grids, and the trees that most files use, compiled once: without these declarations every file
-// that makes such a grid compiles all virtual functions of its tree, reading and writing among them. Include
-// it instead of <openvdb/openvdb.h>, which has grids of points and files besides, and takes more than a
-// second longer to read.
+// OpenVDB's grids, and the trees of most files, compiled once: without these declarations every file that
+// makes such a grid compiles all virtual functions of its tree. Include it instead of <openvdb/openvdb.h>,
+// which has grids of points and files in addition, and takes more than a second longer to read.
 #pragma once
 
 #include <openvdb/Grid.h>
@@ -31,7 +30,7 @@ using Vec3SGrid = Grid<Vec3STree>;
   }                                               \
   Instance class Grid<Tree_>;                     \
   }
-/// The nodes below the root, of values that have no nodes of their own.
+/// The nodes below the root.
 #define HERMESH_INSTANTIATE_NODES(Instance, Value)                     \
   namespace openvdb::OPENVDB_VERSION_NAME::tree {                      \
   Instance class LeafNode<Value, 3>;                                   \

@@ -1,5 +1,5 @@
-// Options of a variant, each bound to the member that it sets, so that its name, its default, its range and
-// its meaning stand in one place.
+// Options of a variant, each bound to the member that it sets, with its name, default, range and meaning in a
+// single entry.
 #pragma once
 
 #include <charconv>
@@ -17,8 +17,7 @@
 
 namespace hermesh {
 
-/// The options that set members of `Settings`. The default of an option is the value that its member has in a
-/// `Settings` that nobody has touched.
+/// The options that set members of `Settings`. The default of an option is its member's default.
 template <class Settings>
 class OptionTable {
  public:
@@ -26,8 +25,7 @@ class OptionTable {
     double minimum = 0.0, maximum = 1e300;  ///< 1e300: no limit
   };
 
-  /// Declares a number, which has to be whole where its member is an integer. `only_with` is that of
-  /// OptionSpec.
+  /// Declares a number, an integer if its member is one. `only_with` is that of OptionSpec.
   template <class Number>
   OptionTable&& number(const std::string& name, Number Settings::*member, Range range, std::string help,
                        std::vector<std::string> only_with = {}) && {
@@ -68,22 +66,22 @@ class OptionTable {
     return std::move(*this);
   }
 
-  /// The declarations, in the order in which they were made, for the variant's entry in the table.
+  /// Returns the declarations in their order, for the variant's entry in the table.
   std::vector<OptionSpec> specs() const {
     std::vector<OptionSpec> specs;
     for (const Entry& entry : entries_) specs.push_back(entry.spec);
     return specs;
   }
 
-  /// The settings that checked options ask for. Options may hold others besides. @throws Error for a number
-  /// that has to be whole; std::logic_error if they lack one.
+  /// Returns the settings of checked options, which may contain others. @throws Error for a number that has
+  /// to be an integer; std::logic_error if one is missing.
   Settings read(const Options& options) const {
     Settings settings{};
     for (const Entry& entry : entries_) entry.set(settings, options);
     return settings;
   }
 
-  /// Makes a table of all options but one, whose member keeps its default.
+  /// Returns a table of all options except one, whose member has its default.
   OptionTable without(const std::string& name) const {
     OptionTable others = *this;
     std::erase_if(others.entries_, [&](const Entry& entry) { return entry.spec.name == name; });

@@ -7,7 +7,7 @@
 #include "algorithms/core/error.h"
 
 namespace hermesh {
-namespace {
+namespace option_table_test {
 
 struct Settings {
   enum class Shape { round, square };
@@ -71,5 +71,5 @@ TEST(OptionTable, ADefaultWithoutANameIsRefused) {
                std::logic_error);
 }
 
-}  // namespace
+}  // namespace option_table_test
 }  // namespace hermesh

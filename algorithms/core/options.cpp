@@ -7,14 +7,14 @@
 #include <stdexcept>
 
 #include "algorithms/core/error.h"
+#include "algorithms/core/variant.h"
 
 namespace hermesh {
 
 namespace {
 
 std::optional<double> parse_number(std::string_view text) {
-  // std::from_chars() knows no locale and no blanks, so a setting reads the same everywhere. What is not
-  // finite is refused here, for NaN would pass both comparisons with the range.
+  // std::from_chars() does not depend on the locale. NaN would pass both comparisons with the range.
   double value = 0.0;
   const char* const end = text.data() + text.size();
   const auto [stop, status] = std::from_chars(text.data(), end, value);
@@ -23,7 +23,6 @@ std::optional<double> parse_number(std::string_view text) {
 }
 
 std::string shortest(double value) {
-  // The shortest text that reads back as the same double has 24 characters at most.
   char buffer[32];
   return std::string(buffer, std::to_chars(buffer, buffer + sizeof buffer, value).ptr);
 }
@@ -35,7 +34,7 @@ std::string joined(const std::vector<std::string>& words) {
 }
 
 std::string range(const OptionSpec& spec) {
-  // The default of OptionSpec::maximum, 1e300, stands for "no limit".
+  // 1e300, the default of OptionSpec::maximum, means no limit.
   const bool open_below = spec.minimum <= -1e300, open_above = spec.maximum >= 1e300;
   if (open_below && open_above) return "any number";
   if (open_above) return "a number of at least " + shortest(spec.minimum);
@@ -43,7 +42,8 @@ std::string range(const OptionSpec& spec) {
   return "a number from " + shortest(spec.minimum) + " to " + shortest(spec.maximum);
 }
 
-/// The value as Options stores it: numbers in their shortest form, so that 0.10 and 0.1 are the same setting.
+/// Returns the value as Options stores it: numbers in their shortest form, so that 0.10 and 0.1 are the same
+/// setting.
 std::string checked(std::string_view variant, const OptionSpec& spec, const std::string& value) {
   const std::string complaint =
       "option '" + spec.name + "' of " + std::string(variant) + " cannot be '" + value + "'; it takes ";
@@ -57,7 +57,8 @@ std::string checked(std::string_view variant, const OptionSpec& spec, const std:
   return shortest(*number);
 }
 
-/// Whether a condition of OptionSpec::only_with holds: one of the values behind "name=" is the option's.
+/// Returns true if a condition of OptionSpec::only_with holds: the option has one of the values after
+/// "name=".
 bool holds(const std::string& condition, const Options& options) {
   const auto [name, values] = parse_option(condition);
   for (std::size_t first = 0; first <= values.size();) {
@@ -68,7 +69,7 @@ bool holds(const std::string& condition, const Options& options) {
   return false;
 }
 
-// A condition as a sentence names it: "kind=packed or fixed".
+/// Returns a condition for a message: "kind=packed or fixed".
 std::string in_words(std::string condition) {
   for (std::size_t bar; (bar = condition.find('|')) != std::string::npos;) condition.replace(bar, 1, " or ");
   return condition;
@@ -78,7 +79,7 @@ std::string in_words(std::string condition) {
 
 Options::Options(std::string_view variant, std::span<const OptionSpec> declared,
                  const std::map<std::string, std::string>& given) {
-  // Unknown names come first: a misspelled name must not pass for an option that was left out.
+  // Unknown names first: a misspelled name must not pass for an omitted option.
   for (const auto& [name, value] : given) {
     if (std::ranges::find(declared, name, &OptionSpec::name) != declared.end()) continue;
     std::vector<std::string> names;
@@ -91,16 +92,14 @@ Options::Options(std::string_view variant, std::span<const OptionSpec> declared,
     values_[spec.name] = checked(variant, spec, entry == given.end() ? spec.fallback : entry->second);
   }
   for (const OptionSpec& spec : declared)
-    // Conditions are judged when all values are there, defaults among them. Only an option that the user gave
-    // can be without effect; a default never complains.
+    // Only an option that the user gave can be without effect.
     for (const std::string& condition : spec.only_with)
       if (given.contains(spec.name) && !holds(condition, *this))
         throw Error("option '" + spec.name + "' of " + std::string(variant) + " has no effect without " +
                     in_words(condition));
 }
 
-// An undeclared name or a wrong type is a fault of the program and not of the user: logic_error instead of
-// Error.
+// An undeclared name or a wrong type is a programming error: logic_error instead of Error.
 double Options::number(std::string_view name) const {
   const std::optional<double> value = parse_number(text(name));
   if (!value) throw std::logic_error("option '" + std::string(name) + "' is not a number");
@@ -119,18 +118,37 @@ bool Options::is(std::string_view name, std::string_view value) const {
 }
 
 std::string Options::canonical() const {
-  // The map is in order of the names, so equal settings give equal texts, however they were given.
   std::string text;
   for (const auto& [name, value] : values_) text += (text.empty() ? "" : " ") + name + "=" + value;
   return text;
 }
 
 std::pair<std::string, std::string> parse_option(std::string_view text) {
-  // At the first equals sign: names hold none, but values may.
+  // At the first equals sign: values may contain others.
   const std::size_t equals = text.find('=');
   if (equals == std::string_view::npos || equals == 0)
     throw Error("'" + std::string(text) + "' is no option; write key=value");
   return {std::string(text.substr(0, equals)), std::string(text.substr(equals + 1))};
+}
+
+namespace {
+
+template <class Variant>
+const Variant& find_entry(std::span<const Variant> table, const std::string& name, const std::string& kind) {
+  if (const auto found = std::ranges::find(table, name, &Variant::name); found != table.end()) return *found;
+  std::string names;
+  for (const Variant& variant : table) names += (names.empty() ? "" : ", ") + variant.name;
+  throw Error("there is no " + kind + " '" + name + "'; there are " + names);
+}
+
+}  // namespace
+
+const Extractor& find_variant(std::span<const Extractor> table, const std::string& name) {
+  return find_entry(table, name, "extractor");
+}
+
+const Voxelizer& find_variant(std::span<const Voxelizer> table, const std::string& name) {
+  return find_entry(table, name, "voxelizer");
 }
 
 }  // namespace hermesh

@@ -10,37 +10,37 @@
 
 namespace hermesh {
 
-/// Declaration of one option. Where `choices` is empty, the value is a number from `minimum` to `maximum`.
+/// Declaration of one option. Without `choices`, the value is a number from `minimum` to `maximum`.
 struct OptionSpec {
   std::string name;
-  std::string fallback;  ///< value when the user gives none
-  std::string help;      ///< meaning, unit, and what a larger value does
+  std::string fallback;  ///< default value
+  std::string help;      ///< meaning, unit, and the effect of a larger value
   std::vector<std::string> choices = {};
   double minimum = 0.0;
   double maximum = 1e300;
-  /// Settings of the variant's other options, each "name=value" or "name=value|value…", without any one of
-  /// which this option has no effect, so that to give it is an error.
+  /// Settings of the variant's other options, each "name=value" or "name=value|value…". This option has no
+  /// effect unless all of them hold, so that giving it is then an error.
   std::vector<std::string> only_with = {};
 };
 
-/// Values of a variant's options: all that it declares, checked.
+/// Checked values of all options that a variant declares.
 class Options {
  public:
   Options() = default;
-  /// Checks `given` against the declarations and fills in what is missing.
-  /// @throws Error naming the variant, the option and what would be allowed; also for an option that has no
-  /// effect beside the others.
+  /// Checks `given` against the declarations and fills in defaults. @throws Error naming the variant, the
+  /// option and the allowed values; also for an option that has no effect with the others.
   Options(std::string_view variant, std::span<const OptionSpec> declared,
           const std::map<std::string, std::string>& given);
 
-  /// The value of a declared option as a number. @throws std::logic_error if it was not declared or is none.
+  /// Returns the value of a declared option as a number. @throws std::logic_error if it was not declared or
+  /// is not a number.
   double number(std::string_view name) const;
-  /// The value of a declared option as text, numbers in their shortest form. @throws std::logic_error if it
-  /// was not declared.
+  /// Returns the value of a declared option as text, numbers in their shortest form. @throws std::logic_error
+  /// if it was not declared.
   const std::string& text(std::string_view name) const;
-  /// Whether the option was declared and has this value.
+  /// Returns true if the option was declared and has this value.
   bool is(std::string_view name, std::string_view value) const;
-  /// All options as "key=value key=value" in alphabetical order, the defaults included: equal for equal
+  /// Returns all options, defaults included, as "key=value key=value" in alphabetical order: equal for equal
   /// settings.
   std::string canonical() const;
 

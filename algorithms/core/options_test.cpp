@@ -5,7 +5,7 @@
 #include "algorithms/core/error.h"
 
 namespace hermesh {
-namespace {
+namespace options_test {
 
 const std::vector<OptionSpec> declared = {
     {.name = "threshold", .fallback = "0.10", .help = "", .choices = {}, .minimum = 0.0, .maximum = 1.0},
@@ -91,5 +91,5 @@ TEST(ParseOption, SplitsAtTheFirstEqualsSign) {
   EXPECT_THROW(parse_option(""), Error);
 }
 
-}  // namespace
+}  // namespace options_test
 }  // namespace hermesh

@@ -4,12 +4,12 @@
 #include <tbb/parallel_for.h>
 
 #include <limits>
+#include <utility>
 
 namespace hermesh {
 
-void parallel_ranges(std::size_t n, const RunContext& context, const RangeFunction& f) {
-  // A block takes microseconds, so that sixteen are worth a task, and none is cancelled late.
-  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, n, 16),
+void parallel_ranges(std::size_t n, const RunContext& context, const RangeFunction& f, std::size_t grain) {
+  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, n, grain),
                     [&](const tbb::blocked_range<std::size_t>& range) {
                       context.check();
                       f(range.begin(), range.end());
@@ -24,11 +24,7 @@ void check_indices(std::uint64_t total, const std::string& what) {
 
 std::uint64_t exclusive_scan(std::vector<std::uint64_t>& counts, const std::string& what) {
   std::uint64_t total = 0;
-  for (std::uint64_t& count : counts) {
-    const std::uint64_t before = total;
-    total += count;
-    count = before;
-  }
+  for (std::uint64_t& count : counts) total += std::exchange(count, total);
   check_indices(total, what);
   return total;
 }

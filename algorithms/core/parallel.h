@@ -1,6 +1,5 @@
-// Count – scan – fill: a parallel pass counts per block, a prefix sum gives each block its first index, a
-// parallel pass writes straight into the final arrays. No locks, and the same bytes for every number of
-// threads.
+// Count, scan, fill: a parallel pass counts per block, a prefix sum gives each block its first index, a
+// parallel pass writes into the final arrays. No locks, and the same bytes for every number of threads.
 #pragma once
 
 #include <cstddef>
@@ -13,7 +12,7 @@
 
 namespace hermesh {
 
-/// Refers to a function of the two ends of a range; the function must outlive it.
+/// Reference to a function of the two ends of a range; the function must outlive it.
 class RangeFunction {
  public:
   template <class F>
@@ -28,21 +27,22 @@ class RangeFunction {
   void (*call_)(const void* function, std::size_t begin, std::size_t end);
 };
 
-/// Calls f(begin, end) for ranges that together are 0…n−1, in parallel, and looks for cancellation before
-/// each. (TBB stays out of this header, for nearly every file would read its headers, half a second each.)
-/// @throws Cancelled.
-void parallel_ranges(std::size_t n, const RunContext& context, const RangeFunction& f);
+/// Calls f(begin, end) in parallel for ranges of about `grain` numbers that together are 0…n−1, and checks
+/// for cancellation before each. (This header does without TBB's, which nearly every file would read, half a
+/// second each.) @throws Cancelled.
+void parallel_ranges(std::size_t n, const RunContext& context, const RangeFunction& f, std::size_t grain);
 
-/// Calls f(i) for i in 0…n−1, in parallel, and looks for cancellation every few blocks. @throws Cancelled.
+/// Calls f(i) in parallel for i in 0…n−1, in tasks of at least `grain`, and checks for cancellation before
+/// each task. A block of samples takes microseconds, so that sixteen are worth a task. @throws Cancelled.
 template <class F>
-void parallel_blocks(std::size_t n, const RunContext& context, F&& f) {
+void parallel_blocks(std::size_t n, const RunContext& context, F&& f, std::size_t grain = 16) {
   const auto range = [&f](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i) f(i);
   };
-  parallel_ranges(n, context, RangeFunction(range));
+  parallel_ranges(n, context, RangeFunction(range), grain);
 }
 
-/// Array of `n` copies of `value`, written in parallel, so that no thread alone touches all its pages.
+/// Returns `n` copies of `value`, written in parallel, so that their pages are first touched by all threads.
 /// @throws Cancelled.
 template <class T>
 LargeArray<T> filled(std::size_t n, const T& value, const RunContext& context) {
@@ -51,12 +51,11 @@ LargeArray<T> filled(std::size_t n, const T& value, const RunContext& context) {
   return result;
 }
 
-/// Checks that indices of 32 bits can number `total` elements. `what` is their name in the plural. @throws
-/// Error
+/// @throws Error if `total` elements need more than 32-bit indices; `what` is their name in the plural.
 void check_indices(std::uint64_t total, const std::string& what);
 
-/// Replaces each count by the sum of the counts before it and returns the total. @throws Error if the total
-/// cannot be an index of 32 bits; `what` names the counted things in the plural.
+/// Replaces each count by the sum of the counts before it and returns the total. @throws Error as
+/// check_indices().
 std::uint64_t exclusive_scan(std::vector<std::uint64_t>& counts, const std::string& what);
 
 }  // namespace hermesh

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <numeric>
 #include <optional>
+#include <set>
 #include <utility>
 
 namespace hermesh {
@@ -14,8 +15,8 @@ namespace {
 using Eigen::Vector2d;
 using Eigen::Vector3d;
 
-/// Newell's normal: twice the area that the polygon encloses, as a vector. Taken about the first corner, so
-/// that rounding is relative to the polygon's size and not to its distance from the origin.
+/// Returns Newell's normal, twice the area that the polygon encloses, as a vector. Taken about the first
+/// corner, so that rounding is relative to the polygon's size and not to its distance from the origin.
 Vector3d newell(std::span<const Vector3d> corners) {
   Vector3d sum = Vector3d::Zero();
   for (std::size_t i = 2; i < corners.size(); ++i)
@@ -23,27 +24,26 @@ Vector3d newell(std::span<const Vector3d> corners) {
   return sum;
 }
 
-/// Twice the area of the triangle abc, positive if counter-clockwise.
+/// Returns twice the area of the triangle abc, positive if counter-clockwise.
 double area(const Vector2d& a, const Vector2d& b, const Vector2d& c) {
   return (b - a).x() * (c - a).y() - (b - a).y() * (c - a).x();
 }
 
-/// Some of the places of a polygon's corners, by a tree of boxes that halves them again and again (Bentley
-/// 1975).
+/// A subset of a polygon's corners in a tree of boxes that halves them recursively (Bentley 1975).
 class PlaceTree {
  public:
-  /// Keeps a reference to `places`; none of them is chosen yet.
+  /// Keeps a reference to `places`; the subset is empty.
   explicit PlaceTree(const std::vector<Vector2d>& places)
       : places_(places), order_(places.size()), slot_(places.size()), chosen_(places.size(), 0) {
     std::iota(order_.begin(), order_.end(), 0u);
-    // Node i has the children 2i and 2i + 1. So many levels of halves leave at most kLeaf places to each of
-    // the last.
+    // Node i has the children 2i and 2i + 1. With these levels the last nodes have at most kLeaf positions
+    // each.
     boxes_.resize(std::size_t(2) << std::bit_width(places.size() / kLeaf));
     build(0, places.size());
     for (std::uint32_t i = 0; i < order_.size(); ++i) slot_[order_[i]] = i;
   }
 
-  /// Puts the place of a corner into the set of chosen ones, or takes it out.
+  /// Adds a corner to the subset or removes it.
   void choose(std::uint32_t corner, bool is_chosen) {
     if (bool(chosen_[corner]) == is_chosen) return;
     chosen_[corner] = is_chosen;
@@ -54,15 +54,14 @@ class PlaceTree {
       (upper ? begin : end) = middle;
       node = 2 * node + upper;
     }
-    // The boxes are those of the chosen places only, so that any_in() leaves branches whose others are in its
-    // way.
+    // The boxes contain only the chosen positions, so that any_in() skips branches without any.
     boxes_[node].setEmpty();
     for (std::size_t i = begin; i < end; ++i)
       if (chosen_[order_[i]]) boxes_[node].extend(places_[order_[i]]);
     while (node /= 2) boxes_[node] = boxes_[2 * node].merged(boxes_[2 * node + 1]);
   }
 
-  /// Whether f(corner) holds for one of the chosen corners in the counter-clockwise triangle abc, border
+  /// Returns true if f(corner) holds for a chosen corner in the counter-clockwise triangle abc, border
   /// included.
   template <class F>
   bool any_in(const Vector2d& a, const Vector2d& b, const Vector2d& c, F&& f) const {
@@ -79,7 +78,7 @@ class PlaceTree {
     for (std::size_t i = begin; i < end; ++i) box.extend(places_[order_[i]]);
     const int axis = box.sizes().x() >= box.sizes().y() ? 0 : 1;
     const std::size_t middle = begin + (end - begin) / 2;
-    // Ties go by number: which places lie in a half then depends on nothing but the polygon.
+    // Ties go by number, so that the halves depend only on the polygon.
     std::nth_element(order_.begin() + std::ptrdiff_t(begin), order_.begin() + std::ptrdiff_t(middle),
                      order_.begin() + std::ptrdiff_t(end), [&](std::uint32_t i, std::uint32_t j) {
                        return std::pair(places_[i][axis], i) < std::pair(places_[j][axis], j);
@@ -106,8 +105,8 @@ class PlaceTree {
            any_in(2 * node + 1, middle, end, box, a, b, c, f);
   }
 
-  /// Whether all of a box lies to the right of a line: its corner farthest to the left does. Rounding keeps
-  /// order, so no place of the box is judged otherwise when it is looked at by itself.
+  /// Returns true if all of a box lies to the right of a line: its corner farthest to the left does. Rounding
+  /// is monotonic, so the test of a single position of the box agrees.
   static bool is_right_of(const Vector2d& from, const Vector2d& to, const Eigen::AlignedBox2d& box) {
     const Vector2d way = to - from;
     const Vector2d most(way.y() > 0 ? box.min().x() : box.max().x(),
@@ -119,64 +118,31 @@ class PlaceTree {
   std::vector<std::uint32_t> order_, slot_;  ///< corners as the leaves have them, and where each is
   std::vector<char> chosen_;
   std::vector<Eigen::AlignedBox2d>
-      boxes_;  ///< of the chosen places of each node; children of i: 2i and 2i + 1
+      boxes_;  ///< of the chosen positions of each node; children of i: 2i and 2i + 1
 };
 
-/// Set of corners that are still to be looked at, as bits in the order of the ring. Bits of a further level
-/// mark the words that are not 0 and so on, so that the next member is found in a few steps however far away
-/// it is.
+/// Set of corners that are still to be tested.
 class Candidates {
  public:
-  explicit Candidates(std::size_t corners) {
-    do levels_.emplace_back(corners = (corners + 63) / 64, 0);
-    while (corners > 1);
-  }
-
-  void add(std::uint32_t i) {
-    for (auto& words : levels_) words[i / 64] |= std::uint64_t(1) << i % 64, i /= 64;
-  }
-  void remove(std::uint32_t i) {
-    for (auto& words : levels_) {
-      words[i / 64] &= ~(std::uint64_t(1) << i % 64);
-      if (words[i / 64]) return;
-      i /= 64;
-    }
-  }
+  void add(std::uint32_t i) { corners_.insert(i); }
+  void remove(std::uint32_t i) { corners_.erase(i); }
   /// Returns the first member from i on, around the ring, or nothing if the set is empty.
   std::optional<std::uint32_t> from(std::uint32_t i) const {
-    const std::optional<std::uint32_t> found = not_before(i);
-    return found || i == 0 ? found : not_before(0);
+    if (corners_.empty()) return std::nullopt;
+    const auto found = corners_.lower_bound(i);
+    return found != corners_.end() ? *found : *corners_.begin();
   }
 
  private:
-  /// Returns the first member from i on up to the end of the ring.
-  std::optional<std::uint32_t> not_before(std::size_t i) const {
-    // Up to a level with a member from i on in the same word, and down to the first corner below that.
-    for (std::size_t level = 0; level < levels_.size(); ++level, i = i / 64 + 1) {
-      if (i / 64 >= levels_[level].size()) return std::nullopt;
-      const std::uint64_t bits = levels_[level][i / 64] & (~std::uint64_t(0) << i % 64);
-      if (!bits) continue;
-      i = i / 64 * 64 + std::size_t(std::countr_zero(bits));
-      while (level-- > 0) i = 64 * i + std::size_t(std::countr_zero(levels_[level][i]));
-      return std::uint32_t(i);
-    }
-    return std::nullopt;
-  }
-
-  std::vector<std::vector<std::uint64_t>> levels_;
+  std::set<std::uint32_t> corners_;
 };
 
-// Ears are cut off a ring of corners that shrinks. Invariant: a corner outside a set of candidates has kept
-// its neighbors since it was judged not to belong, so that on the whole few corners are judged again.
+/// A ring of corners from which ears are cut off. Invariant: the neighbors of a corner outside a set of
+/// candidates are unchanged since it failed the test, so that few corners are tested again.
 class Ring {
  public:
   explicit Ring(std::span<const Vector3d> corners)
-      : places_(placed(corners)),
-        next_(corners.size()),
-        before_(corners.size()),
-        reflex_(places_),
-        perhaps_ears_(corners.size()),
-        perhaps_flat_(corners.size()) {
+      : places_(placed(corners)), next_(corners.size()), before_(corners.size()), reflex_(places_) {
     for (std::uint32_t i = 0; i < corners.size(); ++i) {
       next_[i] = i + 1 == corners.size() ? 0 : i + 1;
       before_[next_[i]] = i;
@@ -193,8 +159,6 @@ class Ring {
     std::vector<Triangle> triangles;
     triangles.reserve(places_.size() - 2);
     std::uint32_t at = 0;
-    // Each turn cuts one corner off, so that n corners give n − 2 triangles, the last of which is what is
-    // left.
     while (left() > 3) {
       if (cut_off_ % 1024 == 1023) {
         context.check();
@@ -203,18 +167,18 @@ class Ring {
       const std::optional<std::uint32_t> corner = next_to_cut(at, context);
       if (!corner) return {};
       triangles.push_back({before_[*corner], *corner, next_[*corner]});
-      // Not the neighbour next, which would make a fan of slivers.
+      // The direct neighbour would make a fan of slivers.
       at = next_[cut(*corner)];
     }
-    // What is left faces the other way: the border crosses itself.
+    // If the remaining triangle faces the other way, the border crosses itself.
     if (area_at(at) < -flat_) return {};
     triangles.push_back({before_[at], at, next_[at]});
     return triangles;
   }
 
  private:
-  /// Places in the plane, seen along the axis that the polygon faces most and counter-clockwise. The
-  /// projection scales all areas alike, and nothing but their signs matters.
+  /// Projects along the axis that the polygon faces most, counter-clockwise. This scales all areas alike, and
+  /// only their signs matter.
   static std::vector<Vector2d> placed(std::span<const Vector3d> corners) {
     const Vector3d normal = newell(corners);
     int axis;
@@ -231,14 +195,13 @@ class Ring {
   std::size_t left() const { return places_.size() - cut_off_; }
   double area_at(std::uint32_t i) const { return area(places_[before_[i]], places_[i], places_[next_[i]]); }
 
-  /// The first ear from a corner on; if there is none, the first corner in a straight line.
+  /// Returns the first ear from a corner on, otherwise the first corner in a straight line.
   std::optional<std::uint32_t> next_to_cut(std::uint32_t at, const RunContext& context) {
     if (const std::optional<std::uint32_t> ear =
             first(perhaps_ears_, at, context, [&](std::uint32_t i) { return is_ear(i); }))
       return ear;
-    // A corner that was no ear becomes one when a neighbour goes. Where the border touches itself it may do
-    // so as well when another corner goes, so all are asked again, but not for every corner of a straight
-    // line.
+    // A corner becomes an ear when a neighbour is cut off; where the border touches itself, also when another
+    // corner is. So all are tested again, but not for every corner of a straight line.
     const auto flat_one = [&] {
       return first(perhaps_flat_, at, context,
                    [&](std::uint32_t i) { return std::abs(area_at(i)) <= flat_; });
@@ -255,8 +218,7 @@ class Ring {
     return flat_one();
   }
 
-  /// The first candidate from a corner on that `is` one; candidates before it that are none are removed until
-  /// they are added again.
+  /// Returns the first candidate from a corner on for which `is` holds, and removes those before it.
   template <class Is>
   static std::optional<std::uint32_t> first(Candidates& candidates, std::uint32_t at,
                                             const RunContext& context, Is&& is) {
@@ -269,15 +231,14 @@ class Ring {
   }
 
   bool is_ear(std::uint32_t at) const {
-    // A straight corner is no ear, for its triangle would have no area; next_to_cut() takes one only for want
-    // of an ear.
+    // The triangle of a straight corner would have no area; next_to_cut() takes one only if there is no ear.
     if (area_at(at) <= 0) return false;
     const Vector2d &a = places_[before_[at]], &b = places_[at], &c = places_[next_[at]];
     return !reflex_.any_in(a, b, c, [&](std::uint32_t i) {
       const Vector2d& p = places_[i];
       if (i == before_[at] || i == next_[at]) return false;
-      // Where the border comes back to the tip it may enter between the sides; from the two other corners it
-      // could not get far without a corner inside.
+      // Where the border returns to the tip it may enter between the sides; from the two other corners it
+      // could not without a corner inside.
       if (p == b) return is_between(a, b, c, places_[before_[i]]) || is_between(a, b, c, places_[next_[i]]);
       return p != a && p != c;
     });
@@ -287,7 +248,7 @@ class Ring {
     return area(a, b, p) > 0 && area(b, c, p) > 0;
   }
 
-  /// Takes a corner out of the ring and returns the one behind it.
+  /// Removes a corner from the ring and returns the next one.
   std::uint32_t cut(std::uint32_t at) {
     const std::uint32_t before = before_[at], next = next_[at];
     next_[before] = next;
@@ -301,7 +262,7 @@ class Ring {
     return next;
   }
 
-  /// Judges a corner anew whose neighbors in the ring have changed.
+  /// Makes a corner whose neighbors in the ring have changed a candidate.
   void look_at(std::uint32_t corner) {
     reflex_.choose(corner, area_at(corner) <= 0);
     perhaps_ears_.add(corner);
@@ -321,8 +282,8 @@ class Ring {
 
 bool is_fan(std::span<const Vector3d> corners) {
   const Vector3d normal = newell(corners);
-  // A triangle without an area, at a corner in line with its neighbours, would leave that corner on the side
-  // of another one, and a sliver that faces the wrong way would lie upon it.
+  // A triangle without area would leave its straight corner on the side of another one, and a sliver that
+  // faces the other way would lie on it.
   constexpr double kRounding = 1e-12;
   const double least = kRounding * normal.squaredNorm();
   for (std::size_t i = 2; i < corners.size(); ++i)

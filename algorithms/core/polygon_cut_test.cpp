@@ -14,7 +14,7 @@
 #include <utility>
 
 namespace hermesh {
-namespace {
+namespace polygon_cut_test {
 
 using Eigen::Vector3d;
 using Polygon = std::vector<Vector3d>;
@@ -201,7 +201,7 @@ Polygon random_star(int corners) {
   return polygon;
 }
 
-/// Polygons of so many corners that leave few ears at a time, or none that is not flat.
+/// Polygons with the requested number of corners that have few ears at a time, or only flat ones.
 void expect_covers_of(int corners) {
   for (const double turns : {0.9, 40.0, 1000.0}) {
     const Polygon polygon = spiral(corners, turns);
@@ -249,5 +249,5 @@ TEST(ClipEars, CancelEndsIt) {
   EXPECT_THROW(clip_ears(spiral(10'000, 8), context), Cancelled);
 }
 
-}  // namespace
+}  // namespace polygon_cut_test
 }  // namespace hermesh

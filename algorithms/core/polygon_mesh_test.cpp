@@ -6,7 +6,7 @@
 #include <random>
 
 namespace hermesh {
-namespace {
+namespace polygon_mesh_test {
 
 Bounds box_of(const Eigen::Vector3d& lower, const Eigen::Vector3d& upper) {
   Bounds box;
@@ -73,5 +73,5 @@ TEST(ChooseOrigin, KeepsSinglePrecisionPointsExactly) {
   }
 }
 
-}  // namespace
+}  // namespace polygon_mesh_test
 }  // namespace hermesh

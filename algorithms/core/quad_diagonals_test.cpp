@@ -3,9 +3,9 @@
 #include <gtest/gtest.h>
 
 namespace hermesh {
-namespace {
+namespace quad_diagonals_test {
 
-/// The quad 0 1 2 3, its corners turned about.
+/// Returns a mesh with the single quad 0 1 2 3.
 PolygonMesh quad(const std::vector<Eigen::Vector3f>& points) {
   PolygonMesh mesh;
   mesh.points = points;
@@ -77,5 +77,5 @@ TEST(QuadDiagonals, AttributesOfCornersTurnAlong) {
             (std::vector<std::int32_t>{7, 8}));
 }
 
-}  // namespace
+}  // namespace quad_diagonals_test
 }  // namespace hermesh

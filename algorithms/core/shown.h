@@ -1,4 +1,4 @@
-// Text from outside within a sentence of ours.
+// Text from outside within messages.
 #pragma once
 
 #include <cstddef>
@@ -7,7 +7,8 @@
 
 namespace hermesh {
 
-/// Number of bytes of the UTF-8 character that `text` begins with, 0 where it begins with none (RFC 3629).
+/// Returns the length in bytes of the UTF-8 character that `text` begins with, or 0 if it is invalid (RFC
+/// 3629).
 inline std::size_t utf8_length(std::string_view text) {
   const auto byte = [&](std::size_t i) { return i < text.size() ? static_cast<unsigned char>(text[i]) : 0u; };
   const unsigned first = byte(0);
@@ -19,23 +20,23 @@ inline std::size_t utf8_length(std::string_view text) {
                                                              : 0;
   for (std::size_t i = 1; i < length; ++i)
     if ((byte(i) & 0xc0) != 0x80) return 0;
-  // Longer than need be, halves of UTF-16 pairs, and beyond the last character.
+  // Overlong forms, halves of UTF-16 pairs, and values beyond the last character.
   if ((first == 0xe0 && byte(1) < 0xa0) || (first == 0xed && byte(1) > 0x9f) ||
       (first == 0xf0 && byte(1) < 0x90) || (first == 0xf4 && byte(1) > 0x8f))
     return 0;
   return length;
 }
 
-/// The text as it can be shown on a terminal in one line: what would control the terminal and what is no
-/// UTF-8 becomes a question mark, runs of blanks and line breaks become one blank. What is beyond `limit`
-/// bytes is left out, from the middle where `keep_end` says so, with "..." in its place.
+/// Returns the text for one line of a terminal: control characters and invalid UTF-8 become question marks,
+/// runs of blanks and line breaks one blank. Beyond `limit` bytes it is shortened, in the middle if
+/// `keep_end`, with "..." instead.
 inline std::string shown(std::string_view text, std::size_t limit = 60, bool keep_end = false) {
   std::string clean;
   for (std::size_t at = 0; at < text.size();) {
     const std::size_t length = utf8_length(text.substr(at));
     const auto first = static_cast<unsigned char>(text[at]);
     const bool blank = first == ' ' || (first >= '\t' && first <= '\r');
-    // The characters U+0080 to U+009F control terminals, too.
+    // U+0080 to U+009F control terminals, too.
     const bool controls = first < 0x20 || first == 0x7f ||
                           (first == 0xc2 && length == 2 && static_cast<unsigned char>(text[at + 1]) < 0xa0);
     if (blank)

@@ -3,7 +3,7 @@
 #include <gtest/gtest.h>
 
 namespace hermesh {
-namespace {
+namespace shown_test {
 
 TEST(Shown, KeepsWhatCanBeShown) {
   EXPECT_EQ(shown("plain words"), "plain words");
@@ -34,5 +34,5 @@ TEST(Shown, IsCutBetweenCharacters) {
   EXPECT_EQ(shown("begin " + std::string(1000, 'x') + " end", 8, true), "begi... end");
 }
 
-}  // namespace
+}  // namespace shown_test
 }  // namespace hermesh

@@ -1,5 +1,5 @@
-// What a variant is: a name with a function, its options, and what it promises. The tables of variants
-// (algorithms/variants.cpp, reference/variants.cpp) are arrays of these; nothing registers itself.
+// Variants: a name with a function, its options and guarantees. The tables of variants
+// (algorithms/variants.cpp, reference/variants.cpp) are arrays of these, without self-registration.
 #pragma once
 
 #include <span>
@@ -14,8 +14,8 @@
 
 namespace hermesh {
 
-/// What a variant guarantees for every finite input. A broken promise is an error of the run; a defect that
-/// nobody promised away is a plain figure.
+/// Guarantees of a variant for every finite input. A violated guarantee is an error of the run; other defects
+/// are only reported.
 struct Promises {
   bool closed = false;                ///< no boundary edge
   bool manifold = false;              ///< no non-manifold edge or vertex
@@ -28,25 +28,24 @@ struct EdgeCrossing;     // hermite/crossing.h
 template <class Crossing>
 struct SparseHermite;  // hermite/sparse_hermite.h
 
-/// Input of an extractor: a volume, and what else is known of its surface.
+/// Input of an extractor: a volume and optional further data on its surface.
 struct ExtractionInput {
   const LevelSet& level_set;
-  double isovalue = 0.0;  ///< in the units of the grid's values
-  const PolygonMesh* source =
-      nullptr;  ///< the polygons that the volume was made from, where they are at hand; else null
+  double isovalue = 0.0;                ///< in the units of the grid's values
+  const PolygonMesh* source = nullptr;  ///< the polygons that the volume was made from, or null
   const Options& options;
   RunContext& context;
-  /// Where an adaptive variant keeps its error bound, and what it does elsewhere; null: everywhere. A uniform
-  /// variant ignores it.
+  /// Where an adaptive variant observes its error bound, and its behaviour elsewhere; null: everywhere.
+  /// Uniform variants ignore it.
   const AdaptivityField* field = nullptr;
-  /// Exact Hermite data of the surface at isovalue 0, on the level set's lattice and with its signs, where
-  /// they are at hand instead of polygons; else null.
+  /// Exact Hermite data of the surface at isovalue 0, on the level set's lattice and with its signs, instead
+  /// of polygons; or null.
   const SparseHermite<EdgeCrossing>* hermite = nullptr;
-  /// True if the mesh goes into a file that holds world coordinates in single precision (STL), so that a
-  /// variant which proves something of its mesh proves it of the points as they will be written.
+  /// True if the mesh is written to a file with world coordinates in single precision (STL), so that proofs
+  /// apply to the points as written.
   bool written_in_single = false;
-  /// The box of index coordinates that a variant keeps its vertices in if it guarantees that nothing
-  /// intersects (extraction/volume_ends.h). Up to rounding, all crossings lie in the box.
+  /// The box of index coordinates that contains the vertices of variants without self-intersections
+  /// (extraction/volume_ends.h). Up to rounding, all crossings lie in the box.
   Bounds caps = Bounds::unbounded();
 };
 
@@ -59,7 +58,7 @@ struct Extractor {
   PolygonMesh (*extract)(const ExtractionInput&);
 };
 
-/// Input of a voxelizer: polygons, and the lattice and band that are wanted.
+/// Input of a voxelizer: polygons, lattice and band.
 struct VoxelizationInput {
   const PolygonMesh& mesh;
   double voxel_size;           ///< world units
@@ -77,9 +76,8 @@ struct Voxelizer {
   LevelSet (*voxelize)(const VoxelizationInput&);
 };
 
-/// The table's entry of this name. @throws Error that lists the names there are.
+/// Returns the table's entry of this name. @throws Error that lists the valid names.
 const Extractor& find_variant(std::span<const Extractor> table, const std::string& name);
-/// The table's entry of this name. @throws Error that lists the names there are.
 const Voxelizer& find_variant(std::span<const Voxelizer> table, const std::string& name);
 
 }  // namespace hermesh

@@ -8,17 +8,17 @@
 #include "algorithms/core/option_table.h"
 #include "algorithms/core/parallel.h"
 #include "algorithms/extraction/hermite_input.h"
-#include "algorithms/hermite/with_normal_code.h"
+#include "algorithms/hermite/normal_codes.h"
 
 namespace hermesh {
 namespace {
 
-/// How far off a plane, in cubes of its longest side, a quad may be that some reader takes for plane, and the
-/// part of its area that counts as none.
+/// Largest distance off a plane, in third powers of its longest side, of a quad that a reader may treat as
+/// plane, and the part of its area that counts as zero.
 constexpr double kPlane = 1e-5, kNoArea = 1e-9;
 
-/// Whether a quad means one surface by its first diagonal, folded back beyond itself, and another one to
-/// whoever takes it for plane and concave, and cuts it along the diagonal inside.
+/// Returns true if a quad is folded back beyond itself along its first diagonal, whereas a reader that treats
+/// it as plane and concave cuts it along the interior diagonal.
 bool is_folded_in_its_plane(const std::vector<Eigen::Vector3f>& points, const Quad& q) {
   const Eigen::Vector3d a = points[q[0]].cast<double>(), u = points[q[1]].cast<double>() - a,
                         v = points[q[2]].cast<double>() - a, w = points[q[3]].cast<double>() - a;
@@ -28,7 +28,7 @@ bool is_folded_in_its_plane(const std::vector<Eigen::Vector3f>& points, const Qu
          std::abs(first.dot(w)) <= kPlane * longest * longest * longest;
 }
 
-/// Writes such quads as the two triangles that were proved, which mean the same to everybody.
+/// Replaces such quads by the two triangles that were proved.
 void part_folded_quads(PolygonMesh& mesh, RunContext& context) {
   std::vector<std::uint8_t> folded(mesh.quads.size());
   parallel_blocks(folded.size(), context,
@@ -46,7 +46,7 @@ void part_folded_quads(PolygonMesh& mesh, RunContext& context) {
   mesh.quads.resize(kept);
 }
 
-/// The mesh in the coordinates that a file holds, relative to the placement's origin.
+/// Returns the mesh in file coordinates, relative to the placement's origin.
 PolygonMesh in_world(CertifiedPolygons polygons, const FilePoints& file, RunContext& context) {
   PolygonMesh result;
   result.origin = file.placement().origin;
@@ -55,7 +55,7 @@ PolygonMesh in_world(CertifiedPolygons polygons, const FilePoints& file, RunCont
                   [&](std::size_t i) { result.points[i] = file.in_file(polygons.points[i]); });
   result.quads = std::move(polygons.quads);
   result.triangles = std::move(polygons.triangles);
-  // A mirror turns the order of corners round.
+  // A mirror reverses the order of corners.
   if (file.placement().mirrors()) {
     for (Quad& quad : result.quads) std::swap(quad[1], quad[3]);
     for (Triangle& triangle : result.triangles) std::swap(triangle[1], triangle[2]);
@@ -64,15 +64,13 @@ PolygonMesh in_world(CertifiedPolygons polygons, const FilePoints& file, RunCont
   return result;
 }
 
-/// The triangles that the field does not leave out, and their points, in the order in which these use them. A
-/// triangle of the uniform mesh is outside if its middle is; one that was merged may have its middle
-/// anywhere.
+/// Returns the triangles that the field does not exclude, and their vertices, in the order of first use. A
+/// triangle of the uniform mesh is outside if its middle is; a merged one may have its middle anywhere.
 CertifiedPolygons within(const FieldAtPoints& field, CertifiedPolygons all) {
   constexpr std::uint32_t kNone = 0xffffffffu;
   std::vector<std::uint32_t> number(all.points.size(), kNone);
   CertifiedPolygons result;
   std::size_t triangle = 0;
-  // `shown` follows this very order, triangles first and then two of each quad.
   for (Triangle t : all_triangles(std::move(all.triangles), all.quads)) {
     const bool shown = !all.shown.empty() && all.shown[triangle];
     ++triangle;
@@ -89,13 +87,13 @@ CertifiedPolygons within(const FieldAtPoints& field, CertifiedPolygons all) {
   return result;
 }
 
-/// What a step of one voxel's length in index space is at most in the world, where voxels may be no cubes:
-/// the map's largest singular value. A bound in world units that is divided by it holds in every direction.
+/// Returns the largest length in the world of a unit step in index space, the map's largest singular value. A
+/// bound in world units divided by it holds in every direction.
 double longest_step(const IndexToWorld& placement) { return placement.linear.operatorNorm(); }
 
 }  // namespace
 
-/// A cell as FieldEvaluator takes it: its block, and the only bit of a mask.
+/// A cell for FieldEvaluator: its block, and the only bit of a mask.
 struct FieldAtPoints::Cell {
   std::array<std::int32_t, 3> lower;
   BlockMask mask{};
@@ -107,7 +105,7 @@ FieldAtPoints::Cell FieldAtPoints::cell_at(const Eigen::Vector3d& p) const {
   int at[3];
   for (int a = 0; a < 3; ++a) {
     const int index = static_cast<int>(std::floor(p[a])) + base_[a];
-    // Bits round down for negative coordinates, too.
+    // Bit operations round down for negative coordinates, too.
     cell.lower[a] = index & ~7;
     at[a] = index & 7;
   }
@@ -116,30 +114,28 @@ FieldAtPoints::Cell FieldAtPoints::cell_at(const Eigen::Vector3d& p) const {
   return cell;
 }
 
-bool FieldAtPoints::in_mask(const Cell& cell) const { return any(evaluator_.inside(cell.lower, cell.mask)); }
+bool FieldAtPoints::in_mask(const Cell& cell) const { return any(inside(cell.lower, cell.mask)); }
 
 bool FieldAtPoints::leaves_out(const Eigen::Vector3d& p) const {
-  return evaluator_.leaves_out_outside() && !in_mask(cell_at(p));
+  return leaves_out_outside() && !in_mask(cell_at(p));
 }
 
 float FieldAtPoints::tolerance(const Eigen::Vector3d& p, double tolerance) const {
   const Cell cell = cell_at(p);
-  // Outside of the mask the scale has no say: a tolerance that is larger than that of simplification stays.
-  if (evaluator_.simplifies_outside() && !in_mask(cell))
+  // Outside of the mask the scale does not apply, and a tolerance larger than that of simplification remains.
+  if (simplifies_outside() && !in_mask(cell))
     return static_cast<float>(std::max(tolerance, kSimplifiedTolerance));
-  // What is left out in the end must not have become part of what is not.
-  if (evaluator_.leaves_out_outside() && !in_mask(cell)) return 0;
-  if (!evaluator_.has_scale()) return static_cast<float>(tolerance);
-  // One entry alone is written and read.
+  // Excluded vertices must not be merged with others.
+  if (leaves_out_outside() && !in_mask(cell)) return 0;
+  if (!has_scale()) return static_cast<float>(tolerance);
   std::array<float, 512> scales;
-  evaluator_.scales(cell.lower, cell.mask, scales);
+  this->scales(cell.lower, cell.mask, scales);
   return static_cast<float>(tolerance * scales[cell.sample]);
 }
 
 std::vector<Triangle> all_triangles(std::vector<Triangle> triangles, const LargeArray<Quad>& quads) {
   triangles.reserve(triangles.size() + 2 * quads.size());
   for (const Quad& q : quads) {
-    // Whoever makes a quad has put the diagonal that it wants between the corners 0 and 2.
     triangles.push_back({q[0], q[1], q[2]});
     triangles.push_back({q[0], q[2], q[3]});
   }
@@ -149,7 +145,6 @@ std::vector<Triangle> all_triangles(std::vector<Triangle> triangles, const Large
 void show(CertifiedPolygons& polygons, const std::function<bool(std::size_t, int, std::uint32_t)>& is_shown) {
   for (const Triangle& t : all_triangles(polygons.triangles, polygons.quads)) {
     const std::size_t number = polygons.shown.size();
-    // A merged triangle stands for something within if one of its corners does.
     polygons.shown.push_back(is_shown(number, 0, t[0]) || is_shown(number, 1, t[1]) ||
                              is_shown(number, 2, t[2]));
   }
@@ -175,10 +170,10 @@ PolygonMesh finished(CertifiedPolygons polygons, const FieldAtPoints& field, con
 
 namespace {
 
-/// The bound that a user asks for.
+/// The requested tolerance.
 struct AskedTolerance {
   double voxels = 0.1;
-  double world = 0.0;  ///< world units; in place of the voxels where it is greater than 0
+  double world = 0.0;  ///< world units; replaces `voxels` if greater than 0
 };
 
 const OptionTable<AskedTolerance>& tolerance_table() {
@@ -203,11 +198,10 @@ PolygonMesh contour_certified(const ExtractionInput& input, std::string_view nam
                               const std::function<PolygonMesh(const HermiteView&, double)>& contour) {
   const AskedTolerance asked = tolerance_table().read(input.options);
   const auto contoured = [&](const HermiteView& grid) {
-    // The bound is proved in index space, whatever units it was asked for in.
     return contour(grid, asked.world > 0 ? asked.world / longest_step(grid.placement()) : asked.voxels);
   };
-  // Packed data are decoded where they are read, by code that is compiled for their normal code; all other
-  // representations are floats by now.
+  // Packed data are decoded on access, by code compiled for their normal code; all other representations are
+  // floats by now.
   const std::string variant(name);
   if (const std::optional<PackedHermite> packed = packed_hermite_input(input, variant))
     return with_normal_code(packed->normal_code,

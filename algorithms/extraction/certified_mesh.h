@@ -1,6 +1,6 @@
-// What the two certified extractors share, `manifold-dual-contouring` (certified_collapse/) and
-// `certified-octree` (certified_octree/): their bounds, a field that scales them, and the way from polygons
-// of index space to the mesh.
+// Parts that the two certified extractors share, `manifold-dual-contouring` (certified_collapse/) and
+// `certified-octree` (certified_octree/): their tolerances, a field that scales them, and the conversion of
+// polygons of index space to the mesh.
 #pragma once
 
 #include <Eigen/Core>
@@ -20,27 +20,26 @@
 
 namespace hermesh {
 
-/// Tolerance outside of a mask that asks for simplification there, in voxels; topology and freedom from
-/// self-intersection hold there, too.
+/// Tolerance outside of a mask with AdaptivityField::Outside::simplify, in voxels; topology and freedom from
+/// self-intersection are preserved there, too.
 inline constexpr double kSimplifiedTolerance = 8.0;
 
-/// An adaptivity field at single places of index space, relative to the placement's base.
-class FieldAtPoints {
+/// An adaptivity field at single positions of index space, relative to the placement's base: a position has
+/// the values of the cell that contains it.
+class FieldAtPoints : public FieldEvaluator {
  public:
-  /// `field` may be null, for none; `placement` is that of the volume whose index space the places are in.
+  /// @param field may be null
+  /// @param placement of the volume whose index space the positions are in
   /// @throws Error as FieldEvaluator's constructor does
   FieldAtPoints(const AdaptivityField* field, const IndexToWorld& placement)
-      : evaluator_(field, placement), base_(placement.base) {}
+      : FieldEvaluator(field, placement), base_(placement.base) {}
 
-  bool is_constant() const {
-    return !evaluator_.simplifies_outside() && !evaluator_.leaves_out_outside() && !evaluator_.has_scale();
-  }
-  bool simplifies() const { return evaluator_.simplifies_outside(); }
-  bool leaves_out_outside() const { return evaluator_.leaves_out_outside(); }
-  /// Whether the mesh is to be open at the place: the cell that holds it is outside of the mask, and the
-  /// field asks for nothing there.
+  bool is_constant() const { return !simplifies_outside() && !leaves_out_outside() && !has_scale(); }
+  bool simplifies() const { return simplifies_outside(); }
+  /// Returns true if the mesh is to be open at a position: it is outside of the mask, and the field excludes
+  /// everything there.
   bool leaves_out(const Eigen::Vector3d& p) const;
-  /// The tolerance that holds at a place, where `tolerance` was asked for, in voxels.
+  /// Returns the tolerance at a position, in voxels, for a requested `tolerance`.
   float tolerance(const Eigen::Vector3d& p, double tolerance) const;
 
  private:
@@ -48,46 +47,45 @@ class FieldAtPoints {
   Cell cell_at(const Eigen::Vector3d& p) const;
   bool in_mask(const Cell& cell) const;
 
-  const FieldEvaluator evaluator_;
   const std::array<std::int32_t, 3> base_;
 };
 
-/// A mesh in the making: points of index space, relative to the placement's base, and polygons between them.
+/// A mesh of vertices in index space, relative to the placement's base.
 struct CertifiedPolygons {
   std::vector<Eigen::Vector3d> points;
   std::vector<Triangle> triangles;
   LargeArray<Quad> quads;
-  /// An entry for each triangle and two for each quad after them, or none at all: whether it stands for
-  /// polygons within the mask, wherever its middle is.
+  /// Empty, or a flag for each triangle of all_triangles(): 1 if it represents polygons within the mask, even
+  /// if its middle is outside.
   std::vector<std::uint8_t> shown;
 };
 
-/// Triangles as given, then two of each quad, cut between its corners 0 and 2.
+/// Returns the triangles, then two of each quad, cut along diagonal 0–2.
 std::vector<Triangle> all_triangles(std::vector<Triangle> triangles, const LargeArray<Quad>& quads);
 
-/// Fills `shown`. `is_shown` is called with the number of a triangle, which of its corners (0 to 2), and the
-/// corner's point; a triangle is shown if one of its corners is.
+/// Fills `shown`. `is_shown` is called with a triangle, one of its corners (0 to 2), and the corner's vertex;
+/// a triangle is shown if one of its corners is.
 void show(CertifiedPolygons& polygons, const std::function<bool(std::size_t, int, std::uint32_t)>& is_shown);
 
 /// Records the uniform mesh's counts as figures of the run.
 void report(const UniformCounts& counts, RunContext& context);
 
-/// The uniform mesh itself, for a tolerance of 0.
+/// Returns the uniform mesh itself, for tolerance 0.
 CertifiedPolygons as_they_are(UniformMesh uniform);
 
-/// The mesh as a file will hold it, without what the field leaves out: a triangle of the uniform mesh whose
-/// middle lies outside of the mask, and a merged one (`shown`) that stands for nothing within. A quad that is
-/// plane but for rounding, concave, and proved along the diagonal outside becomes its two triangles, so that
-/// it means the same to every reader.
+/// Returns the mesh in the precision of a file, without the triangles that the field excludes: those with
+/// their middle outside of the mask that are not `shown`. A quad that is plane except for rounding, concave,
+/// and proved along the diagonal outside becomes its two triangles, so that every reader gets the same
+/// surface.
 PolygonMesh finished(CertifiedPolygons polygons, const FieldAtPoints& field, const FilePoints& file,
                      RunContext& context);
 
-/// The entries `tolerance` and `tolerance_world` of both tables.
+/// Returns the options `tolerance` and `tolerance_world` of both extractors.
 std::vector<OptionSpec> tolerance_options();
 
-/// Calls `contour` with the input's Hermite data and the tolerance in voxels that its options ask for. `name`
-/// is the extractor's, for messages.
-/// @throws Error as hermite_input() does, and what `contour` throws
+/// Calls `contour` with the input's Hermite data and the tolerance of its options in voxels. `name` is the
+/// extractor's, for messages.
+/// @throws Error as hermite_input() does, and any exception of `contour`
 PolygonMesh contour_certified(
     const ExtractionInput& input, std::string_view name, bool needs_normals,
     const std::function<PolygonMesh(const HermiteView&, double tolerance)>& contour);

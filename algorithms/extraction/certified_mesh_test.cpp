@@ -3,7 +3,7 @@
 #include <gtest/gtest.h>
 
 namespace hermesh {
-namespace {
+namespace certified_mesh_test {
 
 PolygonMesh finished_quad(const std::vector<Eigen::Vector3d>& points) {
   RunContext context;
@@ -14,7 +14,7 @@ PolygonMesh finished_quad(const std::vector<Eigen::Vector3d>& points) {
 }
 
 // The corner d lies within abc: cut along a–c, as was proved, the quad covers all of abc and, folded back,
-// acd; whoever takes it for a plane polygon leaves acd out.
+// acd; a reader that treats it as a plane polygon omits acd.
 TEST(CertifiedMesh, AQuadThatOthersCutOtherwiseIsWrittenAsItsTriangles) {
   for (const double bend : {0.0, 1e-7, -1e-7, 1e-6}) {
     const PolygonMesh mesh = finished_quad({{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0.3, 0.3, bend}});
@@ -29,7 +29,7 @@ TEST(CertifiedMesh, AQuadThatMeansOneSurfaceStaysAQuad) {
       {a, b, c, {-0.5, 0.5, 0}},    // convex
       {within, a, b, c},            // concave, and cut within itself
       {a, b, c, {0, 0.5, 0}},       // of three corners in a row
-      {a, b, c, {0.3, 0.3, 0.1}}};  // folded, but by nobody taken for plane
+      {a, b, c, {0.3, 0.3, 0.1}}};  // folded, but not plane for any reader
   for (const std::vector<Eigen::Vector3d>& points : quads) {
     const PolygonMesh mesh = finished_quad(points);
     EXPECT_EQ(mesh.quads.size(), 1u) << points[3].transpose();
@@ -37,5 +37,5 @@ TEST(CertifiedMesh, AQuadThatMeansOneSurfaceStaysAQuad) {
   }
 }
 
-}  // namespace
+}  // namespace certified_mesh_test
 }  // namespace hermesh

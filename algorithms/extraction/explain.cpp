@@ -2,13 +2,13 @@
 
 #include <algorithm>
 
+#include "algorithms/core/level_set.h"
 #include "algorithms/core/number_text.h"
-#include "algorithms/core/value_range.h"
 
 namespace hermesh {
 
 void check_adaptive(const Extractor& extractor) {
-  // A bound that could be kept here and not there has one of these names in every adaptive variant.
+  // Every adaptive extractor has a bound of one of these names.
   for (const OptionSpec& option : extractor.options)
     if (option.name == "threshold" || option.name == "tolerance") return;
   throw Error("the extractor " + extractor.name +
@@ -18,7 +18,7 @@ void check_adaptive(const Extractor& extractor) {
 
 void check_source_has_effect(const Extractor& extractor, const Options& options, double isovalue) {
   if (options.is("hermite", "exact") || options.is("crossings", "exact")) return;
-  // Polygons lie where the distance is 0, so that they have no crossings at any other value.
+  // Polygons lie where the distance is 0, and have no edge crossings at any other value.
   const bool automatic = options.is("hermite", "auto");
   if (automatic && isovalue == 0.0) return;
   throw Error("--source has no effect: " +
@@ -44,7 +44,7 @@ std::string no_surface(const LevelSet& volume, double isovalue, bool of_polygons
                              ", and " + exact_text(static_cast<float>(volume.background())) + " beyond";
   const std::string nothing =
       "there is no surface at the isovalue " + text(isovalue) + ", nothing was written: ";
-  // Samples on both sides mean that the extractor, and not the volume, is why there is nothing.
+  // With samples on both sides, the extractor and not the volume is the reason.
   if (double(lowest) < isovalue && isovalue < std::max(double(highest), volume.background()))
     return nothing + extractor + " found none, although the volume has samples on both sides (" + values +
            "); try another --extractor or smaller voxels";

@@ -1,4 +1,4 @@
-// Sentences for the user about an extraction: what has no effect, where a surface ends, why there is none.
+// Messages about an extraction: options without effect, ends of the data, reasons for an empty mesh.
 #pragma once
 
 #include <string>
@@ -8,20 +8,17 @@
 
 namespace hermesh {
 
-/// Refuses an extractor that is not adaptive where a mask or a tolerance grid is given: it would make its
-/// usual mesh and leave the user in the belief that it did not. @throws Error
+/// @throws Error if the extractor is not adaptive, so a mask or a tolerance grid would have no effect
 void check_adaptive(const Extractor& extractor);
 
-/// Refuses polygons that the extractor would not look at: they would leave the user in the belief that it
-/// did.
-/// @throws Error
+/// @throws Error if the extractor would ignore the source polygons
 void check_source_has_effect(const Extractor& extractor, const Options& options, double isovalue);
 
-/// A sentence that says where a surface runs into the end of the data; empty where it does not.
+/// Returns a note on where a surface runs into the end of the data; empty if it does not.
 std::string ends_note(const DataEnds& ends, Ends treatment);
 
-/// A sentence that says why the mesh that the extractor of that name made of a volume is empty; `of_polygons`
-/// is whether the volume was made of polygons in the same run.
+/// Returns the reason why the mesh that the named extractor made of a volume is empty; `of_polygons` is true
+/// if the volume was made of polygons in the same run.
 std::string no_surface(const LevelSet& volume, double isovalue, bool of_polygons,
                        const std::string& extractor);
 

@@ -26,10 +26,8 @@ class Solid {
   explicit Solid(const Frustum& frustum) {
     check(frustum);
     const Vector3d forward = (frustum.look_at - frustum.position).normalized();
-    // An orthonormal frame: `up` is made perpendicular to the view, and its length is 1 because that of the
-    // others is.
+    // An orthonormal frame: `up` is made perpendicular to the view.
     const Vector3d right = forward.cross(frustum.up).normalized(), up = right.cross(forward);
-    // Half of the angle, since it is measured from the lower to the upper plane.
     const double slope = std::tan(0.5 * frustum.field_of_view * std::numbers::pi / 180.0);
     for (int corner = 0; corner < 8; ++corner) {
       const double depth = corner & 4 ? frustum.far : frustum.near, half = slope * depth;
@@ -40,21 +38,18 @@ class Solid {
     const Vector3d middle = mean();
     for (int f = 0; f < 6; ++f) {
       normals_[f] = (corner(f, 1) - corner(f, 0)).cross(corner(f, 3) - corner(f, 0)).normalized();
-      // Turned away from the middle, so that the order of corners in the table need not be the same for all
-      // faces.
+      // Turned outwards, since the order of corners in the table differs between faces.
       if (normals_[f].dot(middle - corner(f, 0)) > 0) normals_[f] = -normals_[f];
     }
   }
 
-  /// The largest signed distance to the planes of the six faces: exact inside, and nowhere larger than the
-  /// distance.
+  /// Returns the largest signed distance to the planes of the faces: exact inside, elsewhere a lower bound.
   double lower_bound(const Vector3d& point) const {
     double largest = -std::numeric_limits<double>::infinity();
     for (int f = 0; f < 6; ++f) largest = std::max(largest, normals_[f].dot(point - corner(f, 0)));
     return largest;
   }
-  /// Signed distance to the surface. From outside, the nearest point of a convex solid lies on one of its
-  /// faces.
+  /// Returns the signed distance to the surface; outside, the nearest position is on one of the faces.
   double distance(const Vector3d& point) const {
     const double bound = lower_bound(point);
     if (bound <= 0) return bound;
@@ -63,7 +58,7 @@ class Solid {
     return least;
   }
 
-  /// The shorter side of the near plane.
+  /// Returns the shorter side of the near plane.
   double near_side() const {
     return std::min((corners_[1] - corners_[0]).norm(), (corners_[2] - corners_[0]).norm());
   }
@@ -87,12 +82,12 @@ class Solid {
     if (!(f.near > 0 && f.near < f.far)) throw Error("a frustum's near and far plane must be 0 < near < far");
     const Vector3d view = f.look_at - f.position;
     if (!(view.norm() > 0)) throw Error("a frustum must look at another point than its own position");
-    // The sine of the angle between the two; below this the frame would be made of rounding.
+    // Sine of the angle between the two; below this the frame would be rounding errors.
     if (!(view.normalized().cross(f.up.normalized()).norm() > 1e-6))
       throw Error("a frustum's up must not be zero, nor lie along its view");
   }
 
-  /// Corner i of a face, in order around it. Bits of a corner: right, up, far.
+  /// Returns corner i of a face, in order around it. Bits of a corner: right, up, far.
   const Vector3d& corner(int face, int i) const {
     static constexpr int kFaces[6][4] = {{0, 1, 3, 2}, {4, 5, 7, 6}, {0, 2, 6, 4},
                                          {1, 3, 7, 5}, {0, 1, 5, 4}, {2, 3, 7, 6}};
@@ -103,8 +98,8 @@ class Solid {
     for (const Vector3d& corner : corners_) sum += corner;
     return sum / 8.0;
   }
-  /// Distance to one face: to its plane, if the foot of the perpendicular lies on the same side of all four
-  /// edges (which side it is depends on the order of corners), or else to the nearest edge.
+  /// Returns the distance to one face: to its plane, if the foot of the perpendicular lies on the same side
+  /// of all four edges, otherwise to the nearest edge.
   double to_face(int f, const Vector3d& point) const {
     const double height = normals_[f].dot(point - corner(f, 0));
     const Vector3d foot = point - height * normals_[f];
@@ -123,21 +118,20 @@ class Solid {
   std::array<Vector3d, 6> normals_;  ///< unit normals of the faces, outwards
 };
 
-/// The leaf with its first sample there, or null if no sample is within the band.
+/// Returns the leaf with its first sample at `lower`, or null if no sample is within the band.
 std::unique_ptr<SampleLeaf> make_leaf(const Solid& solid, const openvdb::Coord& lower, double voxel,
                                       double band) {
   const auto at = [&](double x, double y, double z) -> Vector3d {
     return Vector3d(lower.x() + x, lower.y() + y, lower.z() + z) * voxel;
   };
-  // The samples of a leaf lie within half the diagonal of 7 voxels of its middle, and the bound changes no
-  // faster than one walks: where it is beyond band and radius at the middle, no sample is in the band.
+  // The bound is 1-Lipschitz: if it exceeds band and radius of the samples at the middle, no sample is in the
+  // band.
   const double radius = std::sqrt(3.0) * 3.5 * voxel, middle = solid.lower_bound(at(3.5, 3.5, 3.5));
   if (std::fabs(middle) > band + radius) return nullptr;
   auto leaf = std::make_unique<SampleLeaf>(lower, static_cast<float>(band), false);
   for (int sample = 0; sample < 512; ++sample) {
     const Vector3d point = at(sample >> 6, (sample >> 3) & 7, sample & 7);
-    // The bound alone settles most samples outside of the band; the distance to faces and edges is for the
-    // others.
+    // The bound decides most samples outside of the band.
     const double bound = solid.lower_bound(point);
     const double value = bound >= band ? band : std::clamp(solid.distance(point), -band, band);
     leaf->setValueOnly(static_cast<openvdb::Index>(sample), static_cast<float>(value));
@@ -161,20 +155,18 @@ LevelSet frustum_mask(const Frustum& frustum, int resolution, RunContext& contex
   if (!(voxel > kLeastVoxel))
     throw Error("the frustum is too small for a mask of " + std::to_string(resolution) +
                 " voxels along it; use larger units, or fewer voxels");
-  constexpr double kNarrow = 2.0;  // voxels between whose samples nothing of the frustum may be seen
-  // Only a note, because the rest of the mask is right all the same.
+  constexpr double kNarrow = 2.0;  // voxels whose samples may miss the frustum; the rest of the mask is right
   if (solid.near_side() < kNarrow * voxel)
     context.note(
         "the frustum's near end is narrower than two voxels of its mask, which may lose it there; "
         "take planes nearer to what is seen, or more voxels");
-  // The leaves that the box and the band around it meet; the grid has its index zero at the world's origin.
+  // The leaves that the box and the band around it meet; index zero is at the world's origin.
   std::array<int, 3> first, count;
   for (int a = 0; a < 3; ++a) {
     first[a] = static_cast<int>(std::floor((box.min()[a] - band) / voxel / 8.0));
     count[a] = static_cast<int>(std::floor((box.max()[a] + band) / voxel / 8.0)) - first[a] + 1;
   }
-  // Threads make leaves, each in its own place; the tree, which takes one at a time, gets them afterwards in
-  // order.
+  // Leaves are made in parallel, and added to the tree in order.
   std::vector<std::unique_ptr<SampleLeaf>> leaves(std::size_t(count[0]) * count[1] * count[2]);
   parallel_blocks(leaves.size(), context, [&](std::size_t i) {
     const int n = static_cast<int>(i), z = n % count[2], y = n / count[2] % count[1],
@@ -188,8 +180,7 @@ LevelSet frustum_mask(const Frustum& frustum, int resolution, RunContext& contex
   grid->setTransform(openvdb::math::Transform::createLinearTransform(voxel));
   for (auto& leaf : leaves)
     if (leaf) grid->tree().addLeaf(leaf.release());
-  // Tiles within the frustum have the background's value so far; the band around them says that they are
-  // inside.
+  // Gives the tiles within the frustum their sign.
   openvdb::tools::signedFloodFill(grid->tree());
   return make_level_set(grid);
 }

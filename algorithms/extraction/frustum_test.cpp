@@ -10,7 +10,7 @@
 #include "algorithms/core/level_set_grid.h"
 
 namespace hermesh {
-namespace {
+namespace frustum_test {
 
 using Eigen::Vector3d;
 
@@ -90,5 +90,5 @@ TEST(Frustum, WhatIsNoneIsRefused) {
   refused([](Frustum& f) { f.far = INFINITY; });
 }
 
-}  // namespace
+}  // namespace frustum_test
 }  // namespace hermesh

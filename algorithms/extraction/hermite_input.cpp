@@ -10,20 +10,20 @@ namespace {
 
 FloatHermite sample(const ExtractionInput& input, const std::string& variant) {
   if (!wants_polygons(input)) return sample_level_set(input.level_set, input.isovalue, input.context);
-  // Who voxelized the input may have exact crossings at hand; then nothing is sampled.
+  // The voxelizer may already have sampled exact crossings.
   if (input.hermite && input.isovalue == 0.0) return *input.hermite;
   const PolygonMesh& source =
       polygons_at_isovalue(input, variant + " was asked for exact Hermite data", "-o hermite=level-set");
   PolygonSampling sampling;
   FloatHermite hermite = sample_polygons(input.level_set, input.isovalue, source, input.context, &sampling);
-  // An edge may change its sign without a polygon on it, where a sample's sign is not the polygons'
+  // An edge may change its sign without a polygon on it, if a sample's sign is not the polygons'
   // (samplers.h).
   if (const std::string note = missed_edges_note(sampling); !note.empty()) input.context.note(note);
   return hermite;
 }
 
-/// Moves the placement's origin to that of the world, with every sample where it was: points in single
-/// precision are then those that a file in single precision holds.
+/// Moves the placement's origin to that of the world without moving samples: vertices in single precision are
+/// then those of a file in single precision.
 void about_world_origin(IndexToWorld& placement) {
   placement.offset += placement.origin;
   placement.origin.setZero();
@@ -39,7 +39,7 @@ std::vector<std::string> normal_code_names() {
 
 bool wants_polygons(const ExtractionInput& input) {
   const std::string& source = input.options.text("hermite");
-  // Asked for by name they are wanted even where there are none, so that who samples can say what is missing.
+  // If requested by name, they are wanted even if there are none, so that sampling reports the error.
   return source == "exact" || (source == "auto" && (input.source || input.hermite) && input.isovalue == 0.0);
 }
 
@@ -57,12 +57,11 @@ std::optional<PackedHermite> packed_hermite_input(const ExtractionInput& input, 
   if (parse_representation(input.options.text("representation")) != Representation::sparse)
     return std::nullopt;
   const NormalCodeId code = parse_normal_code(input.options.text("normals"));
-  // From a level set each leaf is packed as soon as it is sampled, so that the floats of all are never there
-  // together.
+  // From a level set each leaf is packed as soon as it is sampled, so that all floats never exist together.
   PackedHermite hermite = wants_polygons(input)
                               ? pack(sample(input, variant), code, input.context)
                               : sample_level_set_packed(input.level_set, input.isovalue, code, input.context);
-  // Before any point is placed, so that proofs are about the points that the file will hold.
+  // Before any vertex is placed, so that proofs hold for the vertices of the file.
   if (input.written_in_single) about_world_origin(hermite.placement);
   Represented figures;
   figures.crossings = hermite.crossings.size();
@@ -87,10 +86,9 @@ ThesisDense thesis_hermite_input(const ExtractionInput& input, const std::string
 
 FloatHermite hermite_input(const ExtractionInput& input, const std::string& variant, bool needs_normals) {
   const Representation representation = parse_representation(input.options.text("representation"));
-  // Directed distances are offsets alone, which is all that average placement reads.
   if (representation == Representation::directed && needs_normals)
     throw Error("directed distances have no normals to place points by; use -o placement=average with them");
-  // There and back again: the extractor gets what the representation has kept, with its losses.
+  // The extractor gets the data with the losses of the representation.
   Represented data = through(representation, parse_normal_code(input.options.text("normals")),
                              sample(input, variant), input.context);
   if (input.written_in_single) about_world_origin(data.hermite.placement);
@@ -99,7 +97,6 @@ FloatHermite hermite_input(const ExtractionInput& input, const std::string& vari
 }
 
 bool from_level_set_alone(const ExtractionInput& input) {
-  // Sparse floats are the crossings as they are computed; all other representations have a form of their own.
   return !wants_polygons(input) &&
          parse_representation(input.options.text("representation")) == Representation::sparse_float;
 }

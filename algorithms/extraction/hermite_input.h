@@ -1,4 +1,4 @@
-// What the extractors share that work on Hermite data: where it comes from and how it is kept, as options.
+// Source and representation of the Hermite data of extractors, as options.
 #pragma once
 
 #include <optional>
@@ -6,43 +6,42 @@
 #include <vector>
 
 #include "algorithms/core/variant.h"
-#include "algorithms/hermite/dense/dense_hermite.h"
-#include "algorithms/hermite/representation.h"
+#include "algorithms/thesis/voxels/dense_hermite.h"
+#include "algorithms/thesis/voxels/representation.h"
 
 namespace hermesh {
 
-/// `hermite` (exact, level-set or auto), `representation` and `normals` (the code of 16 bits).
+/// Returns the options `hermite` (exact, level-set or auto), `representation` and `normals` (16-bit code).
 std::vector<OptionSpec> hermite_options();
 
-/// Whether crossings are to come from polygons, or from Hermite data that did. `auto` takes them at the
-/// isovalue 0 alone, for nowhere else does the surface that is asked for lie on the polygons.
+/// Returns true if edge crossings are to be taken from polygons, or from Hermite data made of polygons.
+/// `auto` uses them only at the isovalue 0, where the surface lies on the polygons.
 bool wants_polygons(const ExtractionInput& input);
 
-/// The polygons, where a variant `asked` for what only they have; `instead` is the option to do without.
-/// @throws Error if they are not there, or if they do not lie at the isovalue, which is so only at 0.
+/// Returns the polygons. `asked` is the request that needs them, `instead` the option to avoid it, for
+/// messages.
+/// @throws Error if there are none, or the isovalue is not 0
 const PolygonMesh& polygons_at_isovalue(const ExtractionInput& input, const std::string& asked,
                                         const std::string& instead);
 
-/// With the representation 'sparse': sampled as those options say, and never there as floats if from a level
-/// set. Its figures go to the run's context. None with another representation.
-/// @throws Error for exact data where there are no polygons at the isovalue.
+/// Returns the data with the representation 'sparse', never stored as floats if from a level set; none with
+/// another representation. Adds figures to the run's context.
+/// @throws Error for exact data without polygons at the isovalue
 std::optional<PackedHermite> packed_hermite_input(const ExtractionInput& input, const std::string& variant);
 
-/// Samples as those options say and packs the data into the thesis's voxels, whatever `representation` is.
-/// The bytes go to the run's context as figures, but for the crossings that are lost: who reads the voxels
-/// counts them.
-/// @throws Error for exact data where there are no polygons at the isovalue.
+/// Returns the data in the thesis's voxels, whatever `representation` is. Adds figures to the run's context,
+/// except the lost crossings, which the caller counts.
+/// @throws Error for exact data without polygons at the isovalue
 ThesisDense thesis_hermite_input(const ExtractionInput& input, const std::string& variant);
 
-/// Samples as those options say and passes the data through the representation; its figures go to the run's
-/// context, and a note says how many crossing edges no polygon was found for. `variant` is who asks, for the
-/// sentences.
-/// @throws Error for exact data where there are no polygons at the isovalue, and where `needs_normals` but
-/// the representation has none.
+/// Returns the data after a round trip through the representation. Adds figures, and a note on crossing edges
+/// without a polygon, to the run's context. `variant` is the extractor's name, for messages.
+/// @throws Error for exact data without polygons at the isovalue, and if `needs_normals` but the
+/// representation has none
 FloatHermite hermite_input(const ExtractionInput& input, const std::string& variant, bool needs_normals);
 
-/// True where those options ask for the level set's own crossings as they are computed, so that an extractor
-/// may take them from the samples without keeping them.
+/// Returns true if the options select the level set's own crossings without loss, so an extractor may compute
+/// them from the samples without storing them.
 bool from_level_set_alone(const ExtractionInput& input);
 
 }  // namespace hermesh

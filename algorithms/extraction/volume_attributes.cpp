@@ -15,13 +15,12 @@ namespace {
 
 using openvdb::Coord;
 
-/// The eight samples around a place, with trilinear weights.
+/// The eight samples around a position, with trilinear weights.
 struct WeightedCorner {
   Coord at;
   double weight;
 };
 std::array<WeightedCorner, 8> corners_around(const openvdb::Vec3d& index) {
-  // Weights are products of the shares along the axes, and sum to 1.
   const Coord low = Coord::floor(index);
   const openvdb::Vec3d share = index - low.asVec3d();
   std::array<WeightedCorner, 8> corners;
@@ -34,15 +33,13 @@ std::array<WeightedCorner, 8> corners_around(const openvdb::Vec3d& index) {
   return corners;
 }
 
-/// Index coordinates of a point. Each grid has a transform of its own, so that the way leads through the
-/// world.
+/// Returns the index coordinates of a vertex in a grid with its own transform.
 openvdb::Vec3d index_of(const PolygonMesh& mesh, std::size_t point,
                         const openvdb::math::Transform& transform) {
   const Eigen::Vector3d world = mesh.world(point);
   return transform.worldToIndex(openvdb::Vec3d(world.x(), world.y(), world.z()));
 }
 
-// One number has a single component, whatever its index.
 double component_of(double value, int) { return value; }
 template <class T>
 double component_of(const openvdb::math::Vec3<T>& value, int component) {
@@ -54,32 +51,29 @@ void note_missing(std::size_t missing, const std::string& name, RunContext& cont
     context.note(std::to_string(missing) + " points lie beyond the active voxels of the grid " + name);
 }
 
-/// World position that is to be added to the grid's values: zero unless the grid holds closest points as
-/// `hermesh voxelize` writes them, relative to a place near the mesh, so that single precision is enough for
-/// them.
+/// Returns the world position to be added to the grid's values: zero unless the grid has closest points of
+/// `hermesh voxelize`, relative to a position near the mesh, for which single precision is enough.
 openvdb::Vec3d zero_of_positions(const openvdb::GridBase& grid) {
   const auto zero = grid.getMetadata<openvdb::Vec3DMetadata>(kZeroOfPositions);
   return zero ? zero->value() : openvdb::Vec3d(0.0);
 }
 
-/// Writes the first `components` components of the grid's values, trilinear, to those of the attribute from
-/// `first` on.
+/// Interpolates the first `components` components of the grid's values into those of the attribute from
+/// `first`.
 template <class Grid>
 void interpolate(const Grid& grid, const PolygonMesh& mesh, MeshAttribute& attribute, int first,
                  int components, RunContext& context) {
   std::vector<float>& values = std::get<std::vector<float>>(attribute.values);
-  // Threads count together, and a sum has no order; values are written by the one thread that has the point.
   std::atomic<std::size_t> missing{0};
   const openvdb::Vec3d zero = zero_of_positions(grid);
   parallel_blocks((mesh.points.size() + 1023) / 1024, context, [&](std::size_t block) {
-    // An accessor remembers the last nodes that it went through, and so belongs to one thread.
     typename Grid::ConstAccessor access = grid.getConstAccessor();
     const std::size_t end = std::min(mesh.points.size(), 1024 * (block + 1));
     for (std::size_t point = 1024 * block; point < end; ++point) {
       double sums[3] = {}, weights = 0.0;
       for (const WeightedCorner& corner : corners_around(index_of(mesh, point, grid.transform()))) {
         typename Grid::ValueType value;
-        // Inactive samples are no data. What the others weigh is made up to 1 by the division below.
+        // Inactive samples are no data; the division below normalises the weights of the others.
         if (corner.weight <= 0.0 || !access.probeValue(corner.at, value)) continue;
         weights += corner.weight;
         for (int i = 0; i < components; ++i) sums[i] += corner.weight * component_of(value, i);
@@ -105,7 +99,7 @@ void take_nearest(const Grid& grid, const PolygonMesh& mesh, MeshAttribute& attr
       values[point] = -1;
       for (const WeightedCorner& corner : corners_around(index_of(mesh, point, grid.transform()))) {
         typename Grid::ValueType value;
-        // Among equal weights the first corner wins, in an order that is the same for every point.
+        // Of equal weights the first corner wins.
         if (corner.weight <= largest || !access.probeValue(corner.at, value)) continue;
         largest = corner.weight;
         values[point] = static_cast<std::int32_t>(value);
@@ -116,8 +110,7 @@ void take_nearest(const Grid& grid, const PolygonMesh& mesh, MeshAttribute& attr
   note_missing(missing, grid.getName(), context);
 }
 
-/// Scales vectors of three to unit length; a mean of unit vectors is shorter. Zeros, where a point has no
-/// data, stay.
+/// Scales vectors of three to unit length; zeros, of vertices without data, remain.
 void normalise(std::vector<float>& values) {
   for (std::size_t i = 0; i + 3 <= values.size(); i += 3) {
     const double length = std::hypot(double(values[i]), double(values[i + 1]), double(values[i + 2]));
@@ -126,7 +119,7 @@ void normalise(std::vector<float>& values) {
   }
 }
 
-/// The names that the numbers of a grid stand for, from 0 on up to the first one that the metadata lack.
+/// Returns the labels of a grid's values, from 0 up to the first one that the metadata lack.
 std::vector<std::string> labels_of(const openvdb::GridBase& grid) {
   std::vector<std::string> labels;
   for (int i = 0;; ++i) {
@@ -136,7 +129,7 @@ std::vector<std::string> labels_of(const openvdb::GridBase& grid) {
   }
 }
 
-/// Calls f with the grid cast to its own type if that is one of `Grids`. @returns whether it is
+/// Calls f with the grid cast to its own type if that is one of `Grids`. Returns true if it is.
 template <class... Grids, class F>
 bool with_grid(const openvdb::GridBase::Ptr& grid, F&& f) {
   const auto attempt = [&]<class Grid>(const typename Grid::Ptr& typed) {
@@ -145,8 +138,7 @@ bool with_grid(const openvdb::GridBase::Ptr& grid, F&& f) {
   return (attempt.template operator()<Grids>(openvdb::gridPtrCast<Grids>(grid)) || ...);
 }
 
-/// The attribute that one grid gives the mesh's points, with `alpha` (or null) as the fourth
-/// component of a vector's three.
+/// Returns the attribute of one grid, with `alpha` (or null) as the fourth component of vectors.
 /// @throws Error for a type that cannot be sampled; Cancelled.
 MeshAttribute sample_grid(const openvdb::GridBase::Ptr& grid, const openvdb::FloatGrid::Ptr& alpha,
                           const PolygonMesh& mesh, RunContext& context) {
@@ -167,7 +159,6 @@ MeshAttribute sample_grid(const openvdb::GridBase::Ptr& grid, const openvdb::Flo
         interpolate(typed, mesh, attribute, 0, own, context);
       })) {
     if (alpha) interpolate(*alpha, mesh, attribute, 3, 1, context);
-    // Without an alpha only, which would make the fourth number part of the next vector.
     if (attribute.components == 3 && (attribute.name == "normal" || attribute.name.ends_with("-normal")))
       normalise(std::get<0>(attribute.values));
     return attribute;
@@ -188,14 +179,14 @@ bool can_be_sampled(const openvdb::GridBase& grid) {
          grid.isType<openvdb::BoolGrid>();
 }
 
-/// Names of the grids that "all" stands for. @throws Error if the file has none
+/// Returns the names of the grids of "all". @throws Error if the file has none
 std::vector<std::string> all_attributes(VdbReader& file, const std::filesystem::path& path) {
   std::vector<std::string> names;
   for (const std::string& name : file.names()) {
     if (name == "sdf" || name == "udf" || name == "fog") continue;
-    // The alpha of another grid comes with that grid, as its fourth component.
+    // The alpha of another grid is that grid's fourth component.
     if (name.ends_with("-alpha") && file.has(name.substr(0, name.size() - 6))) continue;
-    // Type and class are known from the metadata; no voxel is read for the grids that are passed over.
+    // Type and class are in the metadata, so no voxels of skipped grids are read.
     const openvdb::GridBase::Ptr grid = file.read_metadata(name);
     if (can_be_sampled(*grid) && grid->getGridClass() != openvdb::GRID_LEVEL_SET) names.push_back(name);
   }
@@ -213,7 +204,7 @@ std::vector<std::string> sample_attributes(PolygonMesh& mesh, const std::filesys
     VdbReader file(vdb);
     const std::vector<std::string> chosen =
         names == std::vector<std::string>{"all"} ? all_attributes(file, vdb) : names;
-    // One grid after the other is read and let go, so that the largest one bounds the memory.
+    // One grid at a time, so that the largest one bounds the memory.
     for (const std::string& name : chosen) {
       const std::string alpha_name = name + "-alpha";
       openvdb::FloatGrid::Ptr alpha;

@@ -10,7 +10,7 @@
 #include "algorithms/io/mesh_file.h"
 
 namespace hermesh {
-namespace {
+namespace volume_attributes_test {
 
 namespace fs = std::filesystem;
 using openvdb::Coord;
@@ -127,5 +127,5 @@ TEST_F(VolumeAttributes, WhatIsNotThereIsNamed) {
   }
 }
 
-}  // namespace
+}  // namespace volume_attributes_test
 }  // namespace hermesh

@@ -5,9 +5,11 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <unordered_map>
 
 #include "algorithms/core/level_set_grid.h"
 #include "algorithms/core/parallel.h"
+#include "algorithms/extraction/adaptivity_field.h"
 #include "algorithms/lattice/grid_placement.h"
 #include "algorithms/lattice/leaf_table.h"
 
@@ -16,8 +18,6 @@ namespace {
 
 using openvdb::Coord;
 
-// Signs or states of a whole tile.
-constexpr BlockMask kNoSamples{};
 constexpr BlockMask kAllSamples{~0ull, ~0ull, ~0ull, ~0ull, ~0ull, ~0ull, ~0ull, ~0ull};
 
 /// An edge of the grid from a sample inside to the sample beyond the data.
@@ -27,18 +27,17 @@ struct EndEdge {
   int axis;
   int side;  ///< 0: the sample beyond lies below, 1: above
 
-  /// The order by samples beyond puts all edges side by side that lead to one sample.
+  /// Sorts edges to the same sample next to each other.
   bool operator<(const EndEdge& other) const {
     return std::tie(beyond, axis, side) < std::tie(other.beyond, other.axis, other.side);
   }
 };
 
-/// What makes an edge with a change of sign an end of the data.
+/// Decides which edges with a change of sign are ends of the data.
 struct EndRule {
   bool level_set = false;
-  openvdb::CoordBBox box;  ///< box of the data, where it is no level set
-  std::array<float, 3>
-      largest_rise{};  ///< most that distances can rise from one sample to the next along each axis
+  openvdb::CoordBBox box;               ///< box of the data, where it is no level set
+  std::array<float, 3> largest_rise{};  ///< of distances from one sample to the next along each axis
 
   bool operator()(const Coord& inside, float value, float beyond, int axis, int side) const {
     if (level_set) return std::fabs(double(beyond) - double(value)) > largest_rise[axis];
@@ -46,13 +45,13 @@ struct EndRule {
   }
 };
 
-/// Fills in the rule for a volume; false where the volume has no ends.
+/// Fills in the rule for a volume. Returns false if the volume has no ends.
 bool find_rule(const openvdb::FloatGrid& grid, double isovalue, EndRule& rule) {
   rule.level_set = grid.getGridClass() == openvdb::GRID_LEVEL_SET;
   if (rule.level_set) {
-    // Distances that were stored in half precision, or advected, rise a little more than they should.
+    // Distances stored in half precision, or advected, rise a little more than they should.
     constexpr double kTolerance = 1.01;
-    // A distance rises by no more than the length of the step, in world units a column of the map.
+    // A distance rises by at most the length of the step, in world units a column of the map.
     const IndexToWorld placement = placement_of(grid);
     for (int axis = 0; axis < 3; ++axis)
       rule.largest_rise[axis] = static_cast<float>(kTolerance * placement.linear.col(axis).norm());
@@ -69,13 +68,10 @@ class EndFinder {
  public:
   EndFinder(const LeafTable& table, const EndRule& rule) : table_(table), rule_(rule) {}
 
-  /// All edges that cross an end of the data, in the order of the samples beyond.
+  /// Returns all edges that cross an end of the data, in the order of the samples beyond.
   std::vector<EndEdge> find(const RunContext& context) const {
     std::vector<std::vector<EndEdge>> found(table_.size());
-    parallel_blocks(table_.size(), context, [&](std::size_t i) {
-      for (int axis = 0; axis < 3; ++axis) search(i, axis, found[i]);
-    });
-    // Each leaf has had a list of its own; sorted, they are the same for any number of threads.
+    parallel_blocks(table_.size(), context, [&](std::size_t i) { search(i, found[i]); });
     std::vector<EndEdge> all;
     for (const auto& list : found) all.insert(all.end(), list.begin(), list.end());
     std::sort(all.begin(), all.end());
@@ -83,37 +79,26 @@ class EndFinder {
   }
 
  private:
-  BlockMask inside_of(std::size_t leaf, int dx, int dy, int dz) const {
-    const std::int32_t there = table_.neighbour(leaf, dx, dy, dz);
-    if (there >= 0) return table_.inside(static_cast<std::size_t>(there));
-    return there == kUniformInside ? kAllSamples : kNoSamples;
-  }
-  // The table knows the signs of tiles, but not whether they are active: that takes a look at the tree.
-  BlockMask active_of(std::size_t leaf, int dx, int dy, int dz) const {
-    const std::int32_t there = table_.neighbour(leaf, dx, dy, dz);
-    if (there >= 0) return table_.active(static_cast<std::size_t>(there));
-    return table_.is_active_at(leaf, 8 * dx, 8 * dy, 8 * dz) ? kAllSamples : kNoSamples;
-  }
-
-  void search(std::size_t leaf, int axis, std::vector<EndEdge>& found) const {
-    // The two signs of every edge along the axis that starts in the leaf, as bits. All edges with a change of
-    // sign start in a leaf, as the table promises.
-    const int dx = axis == 0, dy = axis == 1, dz = axis == 2;
-    const BlockMask own[2] = {table_.inside(leaf), inside_of(leaf, dx, dy, dz)};
-    const auto shifted = [&](const BlockMask& here, const BlockMask& next) {
-      return shifted_mask(dx, dy, dz,
-                          [&](int ax, int ay, int az) { return ax + ay + az == 0 ? here : next; });
-    };
-    const BlockMask next = shifted(own[0], own[1]);
-    BlockMask crossing;
-    for (int x = 0; x < 8; ++x) crossing[x] = own[0][x] ^ next[x];
-    // The states of samples cost a look at the leaves themselves, which is spared where nothing crosses.
-    if (!::hermesh::any(crossing)) return;
-    const BlockMask active = table_.active(leaf);
-    const BlockMask next_active = shifted(active, active_of(leaf, dx, dy, dz));
-    for (int x = 0; x < 8; ++x)  // of those the outer end must be inactive
-      crossing[x] &= (own[0][x] & ~next_active[x]) | (next[x] & ~active[x]);
-    for_each_bit(crossing, [&](int sample) { add(leaf, sample, axis, test(own[0], sample) ? 1 : 0, found); });
+  void search(std::size_t leaf, std::vector<EndEdge>& found) const {
+    std::array<BlockMask, 3> edges = table_.crossing_edges(leaf);
+    for (int axis = 0; axis < 3; ++axis) {
+      BlockMask& crossing = edges[std::size_t(axis)];
+      // Without sign changes, the states of samples are not read.
+      if (!::hermesh::any(crossing)) continue;
+      const int dx = axis == 0, dy = axis == 1, dz = axis == 2;
+      const BlockMask &inside = table_.inside(leaf), &active = table_.active(leaf);
+      // The table has the signs of tiles, but their states are only in the tree.
+      const std::int32_t there = table_.neighbour(leaf, dx, dy, dz);
+      const BlockMask beyond = there >= 0 ? table_.active(static_cast<std::size_t>(there))
+                               : table_.is_active_at(leaf, 8 * dx, 8 * dy, 8 * dz) ? kAllSamples
+                                                                                   : BlockMask{};
+      const BlockMask next_active =
+          shifted_mask(dx, dy, dz, [&](int x, int y, int z) { return x + y + z == 0 ? active : beyond; });
+      for (int x = 0; x < 8; ++x)  // the outer end must be inactive
+        crossing[x] &= (inside[x] & ~next_active[x]) | (~inside[x] & ~active[x]);
+      for_each_bit(crossing,
+                   [&](int sample) { add(leaf, sample, axis, test(inside, sample) ? 1 : 0, found); });
+    }
   }
 
   void add(std::size_t leaf, int sample, int axis, int side, std::vector<EndEdge>& found) const {
@@ -121,7 +106,7 @@ class EndFinder {
     const Coord first(x + (sample >> 6), y + ((sample >> 3) & 7), z + (sample & 7));
     Coord second = first;
     ++second[axis];
-    // An end above has its sample inside first, along the axis, and one below has it second.
+    // At an end above, the sample inside comes first along the axis, below second.
     const Coord inside = side ? first : second, beyond = side ? second : first;
     const float value = table_.tree().getValue(inside);
     if (rule_(inside, value, table_.tree().getValue(beyond), axis, side))
@@ -132,7 +117,7 @@ class EndFinder {
   const EndRule& rule_;
 };
 
-/// Returns whether an edge along the axis changes sign that starts at `first` to `last` along the axis.
+/// Returns true if an edge along the axis that starts at `first` to `last` changes sign.
 bool any_crossing(const LeafTable& table, int axis, int first, int last) {
   for (std::size_t leaf = 0; leaf < table.size(); ++leaf) {
     const int lower = table.lower(leaf)[static_cast<std::size_t>(axis)];
@@ -147,7 +132,7 @@ bool any_crossing(const LeafTable& table, int axis, int first, int last) {
   return false;
 }
 
-/// The ends that the edges cross. They are in a box if each lies at the side of the active box.
+/// Returns the ends that the edges cross. They are in a box if each lies at the side of the active box.
 DataEnds ends_of(const std::vector<EndEdge>& edges, const openvdb::CoordBBox& active,
                  const LeafTable& table) {
   DataEnds ends;
@@ -159,19 +144,19 @@ DataEnds ends_of(const std::vector<EndEdge>& edges, const openvdb::CoordBBox& ac
     if (last != (edge.side ? active.max() : active.min())[edge.axis]) ends.in_a_box = false;
   }
   if (!ends.in_a_box) return ends;
-  constexpr int kFarthest = std::numeric_limits<int>::max();
+  constexpr int kLast = std::numeric_limits<int>::max();
   for (int axis = 0; axis < 3; ++axis) {
-    // The edges of an end cross its cap. A sample inside beyond the data has another edge farther on.
+    // The edges of an end cross its cap. A sample inside beyond the data has another edge farther out.
     const int below = active.min()[axis] - 1 - ends.reached[axis][0],
               above = active.max()[axis] + ends.reached[axis][1];
-    // A sample stands for the voxel around it, which ends half a voxel farther on.
-    if (!any_crossing(table, axis, -kFarthest, below)) ends.caps.lower[axis] = active.min()[axis] - 0.5;
-    if (!any_crossing(table, axis, above, kFarthest)) ends.caps.upper[axis] = active.max()[axis] + 0.5;
+    // A sample represents the voxel around it, which ends half a voxel farther out.
+    if (!any_crossing(table, axis, -kLast, below)) ends.caps.lower[axis] = active.min()[axis] - 0.5;
+    if (!any_crossing(table, axis, above, kLast)) ends.caps.upper[axis] = active.max()[axis] + 0.5;
   }
   return ends;
 }
 
-/// The value mirrored at the isovalue, which is outside for one inside.
+/// Returns the value mirrored at the isovalue, which is outside for one inside.
 float mirrored(float value, const InsideRule& rule) {
   constexpr double kLargest = std::numeric_limits<float>::max();
   const double wanted = 2.0 * double(rule.isovalue) - double(value);
@@ -181,16 +166,16 @@ float mirrored(float value, const InsideRule& rule) {
   return std::nextafter(rule.isovalue, rule.scale * std::numeric_limits<float>::infinity());
 }
 
-/// A copy of the grid in which the samples beyond the ends are active and mirror those inside; a level set no
-/// longer.
+/// Returns a copy of the grid, not a level set, in which the samples beyond the ends are active and mirror
+/// those inside.
 openvdb::FloatGrid::Ptr with_mirrored_samples(const openvdb::FloatGrid& grid,
                                               const std::vector<EndEdge>& edges, const InsideRule& rule) {
   const openvdb::FloatGrid::Ptr copy = grid.deepCopy();
   if (copy->getGridClass() == openvdb::GRID_LEVEL_SET) copy->setGridClass(openvdb::GRID_UNKNOWN);
   auto access = copy->getAccessor();
   for (std::size_t i = 0; i < edges.size();) {
-    // A sample beyond may have several neighbours inside, where the data were clipped by a mask: it gets
-    // their mean.
+    // If the data were clipped by a mask, a sample beyond may have several neighbours inside: it gets their
+    // mean.
     std::size_t end = i;
     double sum = 0.0;
     for (; end < edges.size() && edges[end].beyond == edges[i].beyond; ++end)
@@ -201,13 +186,127 @@ openvdb::FloatGrid::Ptr with_mirrored_samples(const openvdb::FloatGrid& grid,
   return copy;
 }
 
-/// A copy of the grid whose inactive samples have the signs of the active ones beside them.
-/// The background must be above 0.
+/// Returns a copy of the grid whose inactive samples have the signs of adjacent active ones. Requires a
+/// background above 0.
 LevelSet with_flooded_signs(const openvdb::FloatGrid& grid) {
   const openvdb::FloatGrid::Ptr copy = grid.deepCopy();
   openvdb::tools::signedFloodFill(copy->tree());
   return make_level_set(copy);
 }
+
+/// Distance from the plane of the last samples within which a vertex counts as in it, in voxels: the error of
+/// single precision far from the origin; thinner slivers are useless.
+constexpr double kInPlane = 2e-3;
+
+/// Index coordinates of a mesh's vertices.
+class IndexSpace {
+ public:
+  IndexSpace(const PolygonMesh& mesh, const LevelSet& volume)
+      : placement_(placement_of(*volume.grid().grid)),
+        inverse_(placement_.linear.inverse()),
+        shift_(mesh.origin - placement_.origin - placement_.offset) {}
+
+  /// Returns the index coordinate of a vertex along one axis, by a row of the inverse map.
+  double coordinate(const Eigen::Vector3f& point, int axis) const {
+    return inverse_.row(axis).dot(point.cast<double>() + shift_) + placement_.base[axis];
+  }
+  /// Returns a vertex moved by a number of voxels along an axis of the grid, which need not be one of the
+  /// world.
+  Eigen::Vector3f moved(const Eigen::Vector3f& point, int axis, double by) const {
+    return (point.cast<double>() + by * placement_.linear.col(axis)).cast<float>();
+  }
+
+ private:
+  IndexToWorld placement_;
+  Eigen::Matrix3d inverse_;
+  Eigen::Vector3d shift_;
+};
+
+/// Cuts off the part of a mesh beyond one plane.
+class PlaneCut {
+ public:
+  /// Moves the vertices within kInPlane of the plane into it.
+  PlaneCut(PolygonMesh& mesh, const IndexSpace& space, int axis, int side, int last) : mesh_(mesh) {
+    depth_.reserve(mesh.points.size());
+    for (Eigen::Vector3f& point : mesh.points) {
+      // Counted upwards along the axis, whichever side the data lie on; depths are counted towards the data.
+      const double over = space.coordinate(point, axis) - last;
+      const bool in_plane = std::fabs(over) < kInPlane;
+      if (in_plane) point = space.moved(point, axis, -over);
+      depth_.push_back(in_plane ? 0.0 : side ? -over : over);
+    }
+  }
+
+  void cut() {
+    std::vector<Triangle> triangles;
+    LargeArray<Quad> quads;
+    // Vertices beyond are left to drop_unused_points().
+    triangles.swap(mesh_.triangles);
+    quads.swap(mesh_.quads);
+    for (const Triangle& t : triangles) {
+      if (is_whole(t))
+        mesh_.triangles.push_back(t);
+      else
+        add_part(t);
+    }
+    for (const Quad& q : quads) {
+      if (is_whole(q)) {
+        mesh_.quads.push_back(q);
+      } else {
+        add_part({q[0], q[1], q[2]});
+        add_part({q[0], q[2], q[3]});
+      }
+    }
+  }
+
+ private:
+  /// Returns true if no corner of a polygon lies beyond the plane, and not all lie in it.
+  template <class Polygon>
+  bool is_whole(const Polygon& polygon) const {
+    bool some = false;
+    for (const std::uint32_t corner : polygon) {
+      if (depth_[corner] < 0.0) return false;
+      some |= depth_[corner] > 0.0;
+    }
+    return some;
+  }
+
+  void add_part(const Triangle& triangle) {
+    // A triangle cut by a plane becomes a triangle or a quad, in the same order of corners.
+    std::array<std::uint32_t, 4> part{};
+    std::size_t size = 0;
+    bool some = false;
+    for (int i = 0; i < 3; ++i) {
+      const std::uint32_t here = triangle[i], next = triangle[(i + 1) % 3];
+      some |= depth_[here] > 0.0;
+      if (depth_[here] >= 0.0) part[size++] = here;
+      // A corner in the plane has depth 0, so no edge is cut next to it.
+      if (depth_[here] * depth_[next] < 0.0) part[size++] = point_between(here, next);
+    }
+    if (!some) return;
+    if (size == 3) mesh_.triangles.push_back({part[0], part[1], part[2]});
+    if (size == 4) mesh_.quads.push_back(part);
+  }
+
+  /// Returns the vertex where the edge from a to b meets the plane, the same for both polygons of the edge.
+  /// It is computed from the lower index, so the order of the polygons does not matter.
+  std::uint32_t point_between(std::uint32_t a, std::uint32_t b) {
+    if (a > b) std::swap(a, b);
+    const auto [entry, is_new] =
+        cuts_.try_emplace(std::uint64_t{a} << 32 | b, static_cast<std::uint32_t>(mesh_.points.size()));
+    if (is_new) {
+      const double share = depth_[a] / (depth_[a] - depth_[b]);
+      const Eigen::Vector3d from = mesh_.points[a].cast<double>(), to = mesh_.points[b].cast<double>();
+      mesh_.points.push_back((from + share * (to - from)).cast<float>());
+      depth_.push_back(0.0);
+    }
+    return entry->second;
+  }
+
+  PolygonMesh& mesh_;
+  std::vector<double> depth_;  ///< how far each point lies below the plane, in voxels; negative beyond it
+  std::unordered_map<std::uint64_t, std::uint32_t> cuts_;
+};
 
 }  // namespace
 
@@ -233,8 +332,7 @@ ClosedVolume close_ends(const LevelSet& level_set, double isovalue, RunContext& 
   const LeafTable table(level_set, isovalue, context);
   const std::vector<EndEdge> edges = EndFinder(table, rule).find(context);
   if (edges.empty()) return {level_set, {}};
-  // Without a sample in a leaf there is no band to flood from: OpenVDB would take the sign of a node's first
-  // tile for all.
+  // Without a leaf there is no band to flood from: OpenVDB would use the sign of a node's first tile for all.
   if (rule.level_set && grid.background() > 0.0f && grid.tree().leafCount() > 0) {
     const LevelSet flooded = with_flooded_signs(grid);
     if (EndFinder(LeafTable(flooded, isovalue, context), rule).find(context).empty()) {
@@ -246,6 +344,35 @@ ClosedVolume close_ends(const LevelSet& level_set, double isovalue, RunContext& 
   }
   const openvdb::CoordBBox active = rule.level_set ? active_box(grid.tree()) : rule.box;
   return {make_level_set(with_mirrored_samples(grid, edges, inside)), ends_of(edges, active, table)};
+}
+
+void flatten_ends(PolygonMesh& mesh, const LevelSet& closed, const DataEnds& ends) {
+  const IndexSpace space(mesh, closed);
+  for (int axis = 0; axis < 3; ++axis)
+    for (int side = 0; side < 2; ++side) {
+      const double plane = (side ? ends.caps.upper : ends.caps.lower)[axis];
+      if (!std::isfinite(plane)) continue;
+      const double least = ends.reached[axis][side] ? kInPlane - 0.5 : 0.0;
+      for (Eigen::Vector3f& point : mesh.points) {
+        const double at = space.coordinate(point, axis);
+        if ((side ? at - plane : plane - at) > least) point = space.moved(point, axis, plane - at);
+      }
+    }
+}
+
+PolygonMesh open_ends(const PolygonMesh& mesh, const LevelSet& closed, const DataEnds& ends) {
+  if (!ends.in_a_box)
+    throw Error(
+        "the volume's data end in no box, so that the surface cannot be left open there; use --ends closed");
+  PolygonMesh result = mesh;
+  result.attributes.clear();
+  const IndexSpace space(mesh, closed);
+  // One plane after the other: edges and corners of the box are cut by each of theirs.
+  for (int axis = 0; axis < 3; ++axis)
+    for (int side = 0; side < 2; ++side)
+      if (ends.reached[axis][side]) PlaneCut(result, space, axis, side, ends.last[axis][side]).cut();
+  drop_unused_points(result);
+  return result;
 }
 
 EndedMesh extract_with_ends(const Extractor& extractor, const ExtractionInput& input, Ends ends) {
@@ -265,8 +392,7 @@ EndedMesh extract_with_ends(const Extractor& extractor, const ExtractionInput& i
   if (ends == Ends::open)
     result.mesh = open_ends(result.mesh, closed.volume, closed.ends);
   else if (!extractor.promises.no_self_intersection)
-    flatten_ends(result.mesh, closed.volume,
-                 closed.ends);  // moves points without a look at what they might meet
+    flatten_ends(result.mesh, closed.volume, closed.ends);  // may cause self-intersections
   return result;
 }
 

@@ -8,9 +8,9 @@
 #include <filesystem>
 #include <sstream>
 
+#include "algorithms/core/level_set.h"
 #include "algorithms/core/level_set_grid.h"
 #include "algorithms/core/quad_diagonals.h"
-#include "algorithms/core/value_range.h"
 #include "algorithms/fracture/noise.h"
 #include "algorithms/fracture/scatter.h"
 #include "algorithms/io/mesh_file.h"

@@ -13,7 +13,7 @@
 
 namespace hermesh {
 
-/// What a word for cutters asks for.
+/// Parsed form of a cutter specification such as `voronoi:50`.
 struct CutterSpec {
   enum class Kind { voronoi, chunks, planes, meshes };
   Kind kind = Kind::voronoi;
@@ -21,21 +21,22 @@ struct CutterSpec {
   std::vector<CuttingPlane> planes;  ///< nx,ny,nz,d with n · x = d, world units
   struct File {
     std::string path;
-    std::size_t copies =
-        0;  ///< 0: one copy in place; else as many, turned at random, their box's centre at scattered places
-    /// The polygons, where they are at hand and `path` is but their name; null: they are read.
+    std::size_t copies = 0;  ///< 0: one copy in place; else the number of copies, rotated at random, with
+                             ///< their box centres at scattered positions
+    /// The polygons, if they are already loaded and `path` is only their name; null: they are read from the
+    /// file.
     const PolygonMesh* mesh = nullptr;
   };
   std::vector<File> files;
 };
 
-/// Reads a word such as `voronoi:50`. @throws Error that says what such a word looks like.
+/// Parses a cutter specification such as `voronoi:50`. @throws Error that states the expected syntax.
 CutterSpec parse_cutters(const std::string& word);
 
 /// The word without the folders of its files, for an output that is the same on every machine.
 std::string without_folders(const std::string& word);
 
-/// What the word does not say of cutters that are scattered.
+/// Parameters of scattered cutters that the specification does not contain.
 struct CutterChoices {
   std::uint64_t seed = 0;
   /// How far the walls of chunks are displaced, as a part of the mean distance between neighbouring seeds.
@@ -44,10 +45,10 @@ struct CutterChoices {
   /// The point (world units) about which seeds cluster, within `impact_radius`; see density_about().
   std::optional<Eigen::Vector3d> impact;
   double impact_radius = 0.0;  ///< 0: a quarter of the object's longest side
-  LevelSet density;            ///< where places are scattered: 0 never, its greatest value most often
+  LevelSet density;            ///< relative density of scattered positions: 0 never, its maximum most often
 };
 
-/// Cutters, and what they were made from.
+/// Cutters, with the meshes and seeds from which they were made.
 struct MadeCutters {
   std::unique_ptr<Cutters> cutters;
   std::vector<CuttingMesh> meshes = {};
@@ -57,8 +58,8 @@ struct MadeCutters {
 /// Box of a solid's samples, world units.
 Bounds bounds_of(const FloatHermite& hermite);
 
-/// Makes the cutters of a word; what it asks to scatter is scattered in the object, and random
-/// planes go through scattered places.
+/// Makes the cutters of a specification. Scattered cutters are scattered in the object, and random planes
+/// pass through scattered positions.
 /// @throws Error for a file that cannot be read; Cancelled.
 MadeCutters make_cutters(const CutterSpec& spec, const FloatHermite& object, const CutterChoices& choices,
                          RunContext& context);

@@ -1,10 +1,10 @@
-// What a solid is broken along: something that gives every place a code, and knows the surface between two
+// The cutters that divide a solid: they assign a code to every position and define the surface between two
 // codes.
 //
-// A *code* says which part of space a sample lies in: the nearest seed, on which side of each plane, the
-// first of the cutting solids that holds it. Samples of one code are one piece, until fracture.h splits those
-// that hang together nowhere. All of these are functions of the place alone, so the same seed gives the same
-// pieces at any thread count.
+// A *code* identifies the part of space that contains a sample: the nearest seed, the side of each plane, or
+// the first of the cutting solids that contains it. Samples of one code form one piece, until fracture.h
+// splits disconnected samples into several pieces. All of these are functions of the position only, so the
+// same seed gives the same pieces at any thread count.
 #pragma once
 
 #include <Eigen/Core>
@@ -23,7 +23,7 @@
 
 namespace hermesh {
 
-/// The part of space that a sample lies in; what a code's bits mean depends on the kind of cutters.
+/// The part of space that contains a sample; the meaning of the bits depends on the kind of cutters.
 using CutCode = std::uint64_t;
 
 /// Where the surface between two codes crosses a lattice edge, and which cutter it belongs to.
@@ -32,8 +32,7 @@ struct CutCrossing {
   std::int32_t cutter;
 };
 
-/// The interface that labelling and meshing ask. Calls of const members may come from several threads at
-/// once.
+/// The interface that labelling and meshing use. Const members may be called from several threads at once.
 class Cutters {
  public:
   using At = std::array<std::int32_t, 3>;  ///< index coordinates
@@ -44,8 +43,8 @@ class Cutters {
   /// sample_index().
   virtual void codes(const At& lower, std::span<CutCode, 512> codes) const = 0;
 
-  /// False if no sample of the block has the code. It may be true of other blocks, too, where that is cheaper
-  /// to say.
+  /// False if no sample of the block has the code. May also return true for other blocks, if that is cheaper
+  /// to determine.
   virtual bool may_hold(const At& /*lower*/, CutCode) const { return true; }
 
   /// The crossing of the edge from sample `at` along `axis` with the surface between two codes, `first` at
@@ -54,34 +53,34 @@ class Cutters {
   virtual std::optional<CutCrossing> crossing(const At& at, int axis, CutCode first,
                                               CutCode second) const = 0;
 
-  /// For an edge that the surface between its two codes does not cross: the end of the edge that the surface
-  /// is nearer to (offset 0 or 1), with the surface's normal. Nothing if the cutters cannot tell.
+  /// For an edge that the surface between its two codes does not cross: the end of the edge that is nearer to
+  /// the surface (offset 0 or 1), with the surface's normal. Nothing if the cutters cannot determine it.
   virtual std::optional<CutCrossing> nearest(const At&, int /*axis*/, CutCode, CutCode) const {
     return std::nullopt;
   }
 
   /// How many cutters there are; their numbers are 0 to count() − 1.
   virtual std::size_t count() const = 0;
-  /// What one cutter is called, in an output.
+  /// The name of one cutter in an output.
   virtual std::string name(std::size_t cutter) const = 0;
 
-  /// Unit normal, in world space, of the plane that separates two codes; of a displaced wall that of the
-  /// plane before the displacement. It is the same or the opposite if the codes change places. Nothing if no
+  /// Unit normal, in world space, of the plane that separates two codes; for a displaced wall, the normal of
+  /// the plane before the displacement. Swapping the codes leaves it unchanged or negates it. Nothing if no
   /// single plane separates them.
   virtual std::optional<Eigen::Vector3d> plane_between(CutCode first, CutCode second) const = 0;
 
   /// True if a code is a pattern of sides of planes, a bit a plane. Else a code is the number of the cutter
   /// that holds the sample, or count() where none does.
   virtual bool plane_sides() const { return false; }
-  /// Whether the cutter is a solid of its own that holds no sample anywhere.
+  /// Returns true if the cutter is a solid of its own that contains no sample.
   virtual bool is_empty(std::size_t) const { return false; }
-  /// For a cutter that is a solid of its own: the samples of the block at `lower` within it, whatever the
-  /// other cutters hold. Nothing for other cutters.
+  /// For a cutter that is a solid of its own: the samples of the block at `lower` inside it, even those that
+  /// other cutters also contain. Nothing for other cutters.
   virtual std::optional<BlockMask> signs(std::size_t, const At& /*lower*/) const { return std::nullopt; }
   /// The Hermite data of a cutter that is a solid of its own, owned by this object; null for other and for
   /// empty cutters.
   virtual const FloatHermite* solid(std::size_t) const { return nullptr; }
-  /// What a piece of a code is called, in an output.
+  /// The name, in an output, of a piece with this code.
   virtual std::string name_of(CutCode code) const = 0;
 };
 
@@ -96,7 +95,7 @@ struct CuttingPlane {
 /// @throws Error for more than 64 planes, or one whose normal has no length.
 std::unique_ptr<Cutters> plane_cutters(std::vector<CuttingPlane> planes, const IndexToWorld& placement);
 
-/// How far the walls of Voronoi cells are displaced. A place x belongs to the seed nearest to x + amplitude ·
+/// Displacement of the walls of Voronoi cells. A position x belongs to the seed nearest to x + amplitude ·
 /// n(x), where n is a smooth random field of three components between −1 and 1 and two octaves (noise.h): a
 /// *chunk*.
 struct Displacement {
@@ -120,10 +119,10 @@ struct CuttingMesh {
   PolygonMesh mesh;
 };
 
-/// Cutting solids one after another (Aldén 2011, §7.1): piece k is what cutter k takes from what the ones
-/// before it left, and the last piece is what no cutter takes. Each mesh is voxelized on the object's
-/// lattice; its crossings are the exact hits of its polygons. A mesh that is empty, or so small that no
-/// sample lies inside, takes nothing.
+/// Cutting solids applied one after another (Aldén 2011, §7.1): piece k is the part of the solid inside
+/// cutter k and outside all cutters before it, and the last piece is the part outside all cutters. Each mesh
+/// is voxelized on the object's lattice; its crossings are the exact hits of its polygons. A mesh that is
+/// empty, or so small that it contains no sample, makes no piece.
 /// @throws Error as check_voxelization_fits(); Cancelled.
 std::unique_ptr<Cutters> mesh_cutters(const std::vector<CuttingMesh>& meshes, const IndexToWorld& placement,
                                       RunContext& context);
@@ -133,7 +132,7 @@ std::unique_ptr<Cutters> mesh_cutters(const std::vector<CuttingMesh>& meshes, co
 std::optional<FloatHermite> hermite_on_lattice(const PolygonMesh& mesh, const IndexToWorld& placement,
                                                RunContext& context);
 
-/// A copy of the mesh, rotated about `centre` by a matrix, scaled, and moved so that `centre` comes to lie at
+/// A copy of the mesh, rotated about `centre` by a matrix, scaled, and moved so that `centre` moves to
 /// `place` (world units).
 PolygonMesh placed(const PolygonMesh& mesh, const Eigen::Matrix3d& rotation, double scale,
                    const Eigen::Vector3d& centre, const Eigen::Vector3d& place);

@@ -15,7 +15,7 @@
 #include "algorithms/hermite/test_lattice.h"
 
 namespace hermesh {
-namespace {
+namespace cutters_test {
 
 using Eigen::Vector3d;
 
@@ -31,7 +31,7 @@ PolygonMesh cuboid(const Vector3d& lower, const Vector3d& upper) {
 
 TEST(GrowingTree, GivesWhatALoopOverAllPlacesGives) {
   Random random(7);
-  // Many places are equal in some coordinates, or in all.
+  // Many positions are equal in some or all coordinates.
   const auto place = [&] {
     Vector3d p;
     for (double& x : p)
@@ -152,8 +152,8 @@ TEST(VoronoiCutters, DisplacedWallsAreFoundToTheStatedError) {
     for (int z = 4; z < 16; ++z)
       if (const auto crossing = cutters->crossing({x, 9, z}, 2, 0, 1)) {
         const auto height = [&](double t) { return z + t + 2.0 * noise(Vector3d(x, 9, z + t) / 6.0).z(); };
-        // The wall is where the displaced place has height 10; within the error it lies on both sides of
-        // that.
+        // The wall is where the displaced position has height 10; it lies on both sides of that height within
+        // the error.
         const double t = crossing->crossing.offset;
         EXPECT_LE(height(t - 2e-6), 10.0);
         EXPECT_GE(height(t + 2e-6), 10.0);
@@ -269,8 +269,8 @@ TEST(PieceAttributes, OriginalPolygonsTakeThoseOfTheSource) {
   EXPECT_NEAR(height[2], 3.0f, 1e-6);
 }
 
-/// A PLY file has texture coordinates at its points; the pieces have them at corners, where seams need
-/// others.
+/// A PLY file has texture coordinates per vertex; the pieces have them per corner, because they differ at
+/// seams.
 TEST(PieceAttributes, TextureCoordinatesOfPointsGoIntoTheCorners) {
   PolygonMesh source = cuboid({0, 0, 0}, {4, 4, 4});
   std::vector<float> uv;
@@ -293,5 +293,5 @@ TEST(PieceAttributes, TextureCoordinatesOfPointsGoIntoTheCorners) {
   for (std::size_t i = 6; i < 12; ++i) EXPECT_EQ(found[i], cut[i]) << i;
 }
 
-}  // namespace
+}  // namespace cutters_test
 }  // namespace hermesh

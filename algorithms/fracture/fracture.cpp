@@ -26,7 +26,7 @@ void settle(LabelledSolid& solid, const Cutters& cutters, const FractureOptions&
                                cutters.name_of(value(sliver.code)), cutters.name_of(value(sliver.into_code)),
                                sliver.samples});
     result.split_off += found.split_off;
-    // The repair comes last in a pass, so that the labels this function leaves are those of simple cells.
+    // Repair is the last step of a pass, so that all cells are simple when this function returns.
     const RepairReport repaired = repair_labels(solid, context);
     result.repair.cells += repaired.cells;
     result.repair.changed_samples += repaired.changed_samples;
@@ -49,8 +49,8 @@ std::vector<std::uint64_t> count_samples(const LabelledSolid& solid, const Label
   return result;
 }
 
-/// Whether the cutter holds a sample of the object, taken by another cutter or not; false for a cutter that
-/// is no solid of its own.
+/// Returns true if the cutter contains a sample of the object, even one that another cutter has taken; false
+/// for a cutter that is not a solid of its own.
 bool meets(const LabelledSolid& solid, const Cutters& cutters, std::size_t cutter) {
   for (const HermiteView::Block& block : solid.blocks) {
     const std::optional<BlockMask> mask = cutters.signs(cutter, block.lower);
@@ -61,7 +61,7 @@ bool meets(const LabelledSolid& solid, const Cutters& cutters, std::size_t cutte
   return false;
 }
 
-/// Whether a lattice edge leads from the solid into the cutter, or from the cutter into the solid.
+/// Returns true if a lattice edge leads from the solid into the cutter, or from the cutter into the solid.
 bool lies_beside(const LabelledSolid& solid, const Cutters& cutters, std::size_t cutter) {
   for (const HermiteView::Block& block : solid.blocks) {
     const auto own = cutters.signs(cutter, block.lower);
@@ -129,8 +129,8 @@ std::vector<CutterRecord> records_of(const LabelledSolid& solid, const LabelledG
     if (const std::int32_t cutter = grid.sides(e).cutter; cutter >= 0)
       ++records[static_cast<std::size_t>(cutter)].edges;
   const bool codes_are_cutters = !cutters.plane_sides();
-  // Codes stay as the cutters gave them, so what a cutter took is told apart from what repairs and merges
-  // left.
+  // Codes are never changed after the cutters assign them, so the samples that a cutter took can be
+  // distinguished from those that remain after repairs and merges.
   const std::vector<std::uint64_t> taken = count_samples(solid, solid.codes, solid.code_values.size() + 1);
   if (codes_are_cutters)
     for (std::size_t i = 0; i < solid.code_values.size(); ++i)
@@ -150,8 +150,8 @@ std::vector<CutterRecord> records_of(const LabelledSolid& solid, const LabelledG
   return records;
 }
 
-/// Counts the faces across which two pieces hang together, but have no seam, and notes those that leave a
-/// gap. Parts that touch in an edge have none.
+/// Counts the faces across which two pieces are connected, but have no seam, and adds a note about those that
+/// leave a gap. Parts that touch in an edge leave none.
 void count_gaps(const LabelledSolid& solid, LabelledFracture& result, RunContext& context) {
   for (const LabelledSolid::JoinedFace& face : solid.joined_faces)
     if (solid.label(face.samples[0]) != solid.label(face.samples[1]))
@@ -189,8 +189,8 @@ LabelledFracture labelled_fracture(const FloatHermite& object, const Cutters& cu
   if (solid.samples == 0)
     throw Error("the object has no sample inside, so there is nothing to break: use smaller voxels");
   LabelledFracture result;
-  // While the solid is still of one piece no cell is a joint, so the sheets found here are those of the
-  // whole's surface; settle_components() needs them to tell what hangs together across faces.
+  // While the solid is still one piece, no cell is a joint, so the sheets found here are those of the surface
+  // of the whole solid; settle_components() needs them to find samples that are connected across faces.
   if (options.split || options.least_samples > 0) find_joined_faces(solid, object, cutters, context);
   label_by_codes(solid, cutters, context);
   // Every further round has more joints of one sheet, so they end; hardly ever is there a second one.
@@ -198,7 +198,7 @@ LabelledFracture labelled_fracture(const FloatHermite& object, const Cutters& cu
     for (const LabelledSolid::Place& cell : result.mesh.meeting_joints)
       solid.one_sheet.insert(LabelledSolid::key(cell));
     settle(solid, cutters, options, result, context);
-    // Crossings and sheets depend on the labels, so each round makes the grid, the records and the mesh anew.
+    // Crossings and sheets depend on the labels, so each round recomputes the grid, the records and the mesh.
     const LabelledGrid grid(solid, object, cutters, context);
     result.made_up_crossings = grid.made_up();
     result.grid_bytes = grid.memory_bytes();
@@ -208,8 +208,8 @@ LabelledFracture labelled_fracture(const FloatHermite& object, const Cutters& cu
     result.mesh = joint_mesh(grid, options.placement, context);
   } while (!result.mesh.meeting_joints.empty());
   count_gaps(solid, result, context);
-  // Decimation comes last, for its patches are those of the final labels. The counts above are of the
-  // lattice.
+  // Decimation is the last step, because its patches depend on the final labels. The counts above refer to
+  // the lattice, before decimation.
   decimate_joint_mesh(result.mesh, options.tolerance, context);
   result.met_joints = solid.one_sheet.size();
   result.pieces = std::make_unique<PieceTriangles>(result.mesh, solid.piece_count());
@@ -217,7 +217,8 @@ LabelledFracture labelled_fracture(const FloatHermite& object, const Cutters& cu
   result.small_kept = static_cast<std::uint64_t>(
       std::count_if(result.samples.begin() + 1, result.samples.end(),
                     [&](std::uint64_t samples) { return samples < options.least_samples; }));
-  // Label 0 is the outside: only its samples within the solid's blocks were counted, which mean nothing.
+  // Label 0 is the outside: only its samples within the solid's blocks were counted, so its count is
+  // meaningless.
   result.samples[0] = 0;
   result.names.resize(1);
   result.codes.resize(1);

@@ -20,7 +20,7 @@
 
 namespace hermesh {
 
-/// What became of one cutter.
+/// Result of one cutter.
 struct CutterRecord {
   enum class State {
     cuts,      ///< some piece ends at it
@@ -37,7 +37,7 @@ struct CutterRecord {
   std::uint64_t samples = 0;  ///< the object's samples with the cutter's number as code; 0 for planes
   std::uint64_t edges = 0;    ///< lattice edges that the cutter cuts
 };
-/// The state's name as it stands in the enumeration.
+/// The name of the enumerator.
 const char* to_string(CutterRecord::State state);
 /// The state as the rest of a sentence that begins with the cutter's name, such as "cuts the object".
 const char* in_words(CutterRecord::State state);
@@ -45,8 +45,8 @@ const char* in_words(CutterRecord::State state);
 struct FractureOptions {
   DualContouringOptions placement;
   double tolerance = 0.0;            ///< voxels; above 0 the mesh is made coarser (joint_decimation.h)
-  bool split = true;                 ///< pieces that hang together nowhere become several
-  std::uint64_t least_samples = 27;  ///< smaller pieces join a neighbour; 27 is a cube of 3³. 0 keeps all
+  bool split = true;                 ///< disconnected pieces become several
+  std::uint64_t least_samples = 27;  ///< merge smaller pieces into a neighbour; 27: a cube of 3³, 0: none
 };
 
 /// A sliver that was given to a neighbour: the codes of both, and the cutters' names for them.
@@ -68,7 +68,8 @@ struct LabelledFracture {
   std::uint64_t split_off = 0;   ///< pieces that are there because some fell apart
   std::uint64_t small_kept = 0;  ///< pieces that stayed below the least number of samples
   RepairReport repair;
-  /// Joints that had to have one sheet, for polygons at or beside them met others (LabelledSolid::one_sheet).
+  /// Joints that were restricted to one sheet, because polygons at or next to them intersected others
+  /// (LabelledSolid::one_sheet).
   std::uint64_t met_joints = 0;
   /// `cut_edges` counts the lattice edges between two pieces; at `made_up_crossings` of them no cutter's
   /// surface passes (LabelledGrid).
@@ -82,9 +83,9 @@ struct LabelledFracture {
   std::uint32_t piece_count() const { return pieces ? pieces->count() : 0; }
 };
 
-/// Breaks an object along the cutters into pieces that are closed manifolds and meet in shared triangles
-/// (labelled_mesh.h). The same bytes at any thread count.
-/// @throws Error for an object without a sample inside, or one that has no end; Cancelled.
+/// Breaks an object along the cutters into pieces that are closed manifolds and share the triangles of their
+/// seams (labelled_mesh.h). The result has the same bytes at any thread count.
+/// @throws Error for an object without an inside sample, or one of infinite extent; Cancelled.
 LabelledFracture labelled_fracture(const FloatHermite& object, const Cutters& cutters,
                                    const FractureOptions& options, RunContext& context);
 

@@ -1,4 +1,4 @@
-// A tree of places that answers queries for the nearest, and grows by one place at a time.
+// A tree of positions that answers nearest-neighbour queries and grows by one position at a time.
 #pragma once
 
 #include <Eigen/Core>
@@ -9,12 +9,12 @@
 
 namespace hermesh {
 
-/// A k-d tree (Bentley 1975) with a place in each node. Places that come in no order, as scattered ones do,
-/// leave it balanced well enough: a query visits about log n nodes. Distances are those of (place -
-/// p).squaredNorm(), bit for bit: rounding is monotonic, so the distance along one axis is never above them.
+/// A k-d tree (Bentley 1975) with one position per node. Positions in no particular order, such as scattered
+/// ones, leave it sufficiently balanced: a query visits about log n nodes. Distances equal (place -
+/// p).squaredNorm() bit for bit: rounding is monotonic, so the distance along one axis is never above them.
 class GrowingTree {
  public:
-  /// Adds a place; its number is the count of those before it.
+  /// Adds a position; its number is the count of those before it.
   void add(const Eigen::Vector3d& place) {
     nodes_.push_back({place, {0, 0}});
     const auto added = static_cast<std::uint32_t>(nodes_.size() - 1);
@@ -26,14 +26,14 @@ class GrowingTree {
     }
   }
 
-  /// Returns the squared distance to the nearest place, or infinity if there are no places.
+  /// Returns the squared distance to the nearest position, or infinity if the tree is empty.
   double nearest(const Eigen::Vector3d& p) const {
     double least = std::numeric_limits<double>::infinity();
     visit(p, [&](std::uint32_t, double squared) { return least = std::min(least, squared); });
     return least;
   }
 
-  /// Calls f(number) for each place whose squared distance is at most `squared`, in no particular order.
+  /// Calls f(number) for each position whose squared distance is at most `squared`, in no particular order.
   template <class F>
   void for_each_within(const Eigen::Vector3d& p, double squared, F&& f) const {
     visit(p, [&](std::uint32_t number, double found) {
@@ -45,17 +45,17 @@ class GrowingTree {
  private:
   struct Node {
     Eigen::Vector3d place;
-    std::uint32_t
-        children[2];  ///< below the place along the node's axis, and not below; 0: none, for it is the root
+    std::uint32_t children[2];  ///< below the node's position along its axis, and not below; 0: none, because
+                                ///< 0 is the root
   };
   struct Open {
     std::uint32_t node;
     int axis;
-    double squared;  ///< lower bound of the distance to all places beneath the node
+    double squared;  ///< lower bound of the distance to all positions beneath the node
   };
 
-  /// Calls f(number, squared distance) for places until those left are farther away than what it returned
-  /// last.
+  /// Calls f(number, squared distance) for positions until all remaining ones are farther away than the last
+  /// value that f returned.
   template <class F>
   void visit(const Eigen::Vector3d& p, F&& f) const {
     if (nodes_.empty()) return;

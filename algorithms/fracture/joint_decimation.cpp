@@ -12,12 +12,13 @@ constexpr double kMostChange = 0.01;
 /// The share of a tolerance that is tried next, and the least one in voxels, below which it is 0.
 constexpr float kLower = 0.25f, kLeastTolerance = 1.0f / 64;
 
-/// Whether two triangles belong to one patch: the same two pieces on the same sides, the same cutter.
+/// Returns true if two triangles belong to one patch: the same two pieces on the same sides, and the same
+/// cutter.
 bool same_patch(const EdgeSides& a, const EdgeSides& b) {
   return a.back == b.back && a.front == b.front && a.cutter == b.cutter;
 }
 
-/// For each point 1 if triangles of more than one patch meet there, else 0.
+/// Returns 1 for each vertex at which triangles of more than one patch meet, else 0.
 std::vector<std::uint8_t> rims(const JointMesh& mesh) {
   std::vector<std::uint8_t> result(mesh.points.size());
   std::vector<std::uint32_t> first(mesh.points.size(), FineMesh::kNone);
@@ -36,8 +37,8 @@ void decimate_joint_mesh(JointMesh& mesh, double tolerance, RunContext& context)
   // All patches are decimated as one mesh, so the proof that no two triangles meet holds across pieces, too.
   const FilePoints file(mesh.placement);
   const FineMesh fine(mesh.points, mesh.triangles, context);
-  // Where more than two triangles share an edge its ends lie on a rim, and rims are pinned: that is what
-  // decimate_certified() asks of a complex of patches.
+  // Edges shared by more than two triangles have their ends on a patch boundary, and patch boundaries are
+  // pinned, as decimate_certified() requires of a complex of patches.
   std::vector<TrianglePieces> pieces;
   for (const EdgeSides& side : mesh.sides) pieces.push_back({side.back, side.front});
   const ShellVolumes shells(fine, pieces);

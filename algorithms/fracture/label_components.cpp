@@ -14,11 +14,12 @@ namespace {
 
 constexpr std::uint16_t kNoComponent = 0xffff;
 
-/// The sets of samples that hang together, as sets of components of blocks.
+/// Connected sets of samples, as sets of components of blocks.
 ///
-/// A component is what hangs together within one block. Components are numbered by block and, within it, by
-/// first sample; DisjointSets keeps the lowest number of a set as its root. So every root stands for the
-/// set's first sample, whatever the order of joins, and nothing here depends on the number of threads.
+/// A component is a connected set of samples within one block. Components are numbered by block and, within
+/// it, by first sample; DisjointSets preserves the lowest number of a set as its root. So every root
+/// represents the set's first sample, regardless of the order of joins, and the result does not depend on the
+/// number of threads.
 class Components {
  public:
   Components(LabelledSolid& solid, RunContext& context) : solid_(solid), context_(context) {
@@ -28,8 +29,7 @@ class Components {
       if (solid_.label(a) == solid_.label(b)) sets_.join(component(a), component(b));
   }
 
-  /// Makes one set of all components of a label, whether they touch or not (ComponentOptions::split is
-  /// false).
+  /// Makes one set of all components of a label, connected or not (ComponentOptions::split is false).
   void join_equal_labels() {
     std::map<std::uint32_t, std::uint32_t> first;
     for (std::uint32_t c = 0; c < label_.size(); ++c) {
@@ -147,8 +147,8 @@ class Components {
     std::vector<std::uint32_t> sizes;
   };
 
-  /// Finds the components of a block by lattice edges within it. Writes `locals_` of this block alone, so
-  /// blocks may be numbered in parallel.
+  /// Finds the components of a block by lattice edges within it. Writes only this block's entry of `locals_`,
+  /// so blocks may be numbered in parallel.
   InBlock number_block(std::size_t b) {
     const auto block = static_cast<std::int32_t>(b);
     if (solid_.labels.is_uniform(block)) {
@@ -208,7 +208,7 @@ class Components {
         const std::int32_t there =
             solid_.blocks[b].neighbours[neighbour_slot(axis == 0, axis == 1, axis == 2)];
         if (there < 0) continue;
-        // Between two blocks of one label each all 64 edges say the same: one will do.
+        // Between two blocks with one label each, all 64 edges give the same result, so one is enough.
         const bool plain = !locals_[b] && !locals_[static_cast<std::size_t>(there)];
         for (int i = 0; i < (plain ? 1 : 64); ++i) {
           const int u = i >> 3, v = i & 7;
@@ -227,7 +227,7 @@ class Components {
   }
 
   /// The contacts of each set smaller than `least`, by its root; an empty map for a set that touches no
-  /// other. Large sets have no entry: they are most of the samples, and their contacts are never asked for.
+  /// other. Large sets have no entry: they contain most of the samples, and their contacts are never used.
   std::map<std::uint32_t, Shared> shared_contacts(std::uint64_t least) {
     std::map<std::uint32_t, Shared> result;
     std::vector<char> concerned(solid_.blocks.size());
@@ -245,7 +245,7 @@ class Components {
         if (local_of(b, i) == kNoComponent) continue;
         const std::uint32_t root = sets_.find(component({static_cast<std::int32_t>(b), i}));
         if (total_[root] >= least) continue;
-        // Seen from the small set alone, so an edge between two small sets counts once for either.
+        // Counted only from the small set, so an edge between two small sets counts once for each.
         for (int face = 0; face < 6; ++face) {
           int at[3] = {i >> 6, (i >> 3) & 7, i & 7};
           at[face >> 1] += face & 1 ? 1 : -1;

@@ -10,10 +10,10 @@
 namespace hermesh {
 
 struct ComponentOptions {
-  /// True if samples of one piece that do not hang together become several pieces; else a piece may have
-  /// several closed surfaces. Two samples hang together by a *contact*: a lattice edge, or an ambiguous face
-  /// across which the whole's surface joins them (LabelledSolid::joined_faces) and which no joint shares.
-  /// Parts that are thin and aslant in the lattice have many such faces and few edges.
+  /// True if disconnected parts of one piece become several pieces; else a piece may have several closed
+  /// surfaces. Two samples are connected by a *contact*: a lattice edge, or an ambiguous face across which
+  /// the surface of the whole solid joins them (LabelledSolid::joined_faces) and which belongs to no joint.
+  /// Thin parts oblique to the lattice have many such faces and few edges.
   bool split = true;
   /// The least number of samples of a piece. A smaller one joins the neighbour that it has most contacts with
   /// (the lowest of equals), the smallest first. 0 keeps everything.
@@ -33,12 +33,12 @@ struct ComponentReport {
   std::uint64_t small_kept = 0;  ///< pieces below the least number of samples that have no neighbour
 };
 
-/// Splits and merges pieces as the options say and numbers all of them anew, 1 to n without a gap, by their
-/// code and then by their first sample. The result does not depend on the number of threads.
+/// Splits and merges pieces as the options specify and renumbers all of them from 1 to n without gaps, by
+/// their code and then by their first sample. The result does not depend on the number of threads.
 ///
-/// Simple cells (label_repair.h) stay simple where pieces only get other numbers. Splitting and merging may
-/// leave cells that are not simple: corners of one piece that hang together across an ambiguous face only may
-/// come to lie in two pieces. So the labels have to be repaired afterwards.
+/// Simple cells (label_repair.h) remain simple if pieces are only renumbered. Splitting and merging may leave
+/// cells that are not simple: corners of one piece that are connected only across an ambiguous face may
+/// become parts of two pieces. So the labels have to be repaired afterwards.
 /// @throws Cancelled
 ComponentReport settle_components(LabelledSolid& solid, const ComponentOptions& options, RunContext& context);
 

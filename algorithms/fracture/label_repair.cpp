@@ -29,8 +29,7 @@ int signs_of(const CornerLabels& labels, std::uint32_t label) {
   return signs;
 }
 
-/// The inside corners that hang together with `corner` by edges of the cell, whatever their labels; a bit a
-/// corner.
+/// The inside corners that edges of the cell connect to `corner`, regardless of their labels, as a bit mask.
 int part_of(const CornerLabels& labels, int corner) {
   int part = 1 << corner;
   for (int before = 0; before != part;) {
@@ -58,8 +57,8 @@ class Repair {
   RepairReport run() {
     std::vector<Place> cells = find_cells();
     report_.cells = cells.size();
-    // The first phase makes only changes that leave fewer cells that are not simple. A cell that none betters
-    // waits, and is tried again when something beside it has changed.
+    // The first phase makes only changes that reduce the number of cells that are not simple. A cell that no
+    // change improves waits, and is tried again when a cell next to it has changed.
     std::vector<Place> waiting = run_rounds(cells, [&](const Place& cell) { return better(cell); });
     // The second phase lowers labels; lower() always succeeds, so no cell is left.
     run_rounds(waiting, [&](const Place& cell) { return lower(cell); });
@@ -114,7 +113,7 @@ class Repair {
       cells = around(changed_);
       std::erase_if(cells, [&](const Place& cell) { return simple(cell); });
     }
-    // Likewise a cell that was left may have been mended from a cell beside it.
+    // A remaining cell may likewise have become simple through a change at a cell next to it.
     std::erase_if(left, [&](const Place& cell) { return simple(cell); });
     sort(left);
     return left;
@@ -157,9 +156,9 @@ class Repair {
 
   struct Effect {
     int more;    ///< cells that are not simple after the change, less those before it
-    bool mends;  ///< whether the changed cell itself is simple after it
+    bool mends;  ///< true if the changed cell itself is simple after it
   };
-  /// Tries a change and takes it back: the labels are afterwards what they were.
+  /// Tries a change and undoes it: the labels are unchanged afterwards.
   Effect effect(const Place& cell, const Change& change) {
     Cells samples;
     std::array<std::uint32_t, 8> old{};
@@ -191,8 +190,8 @@ class Repair {
   }
 
   /// The changes that are tried at a cell: one inside corner takes another label of the cell, or all inside
-  /// corners that hang together take a label that one of them has. None touches the outside or brings in a
-  /// label that is not at the cell already.
+  /// corners of a connected set take a label of one of them. None changes the outside or introduces a label
+  /// that the cell does not have.
   static std::vector<Change> changes(const CornerLabels& corners) {
     std::vector<Change> result;
     std::vector<std::uint32_t> present(corners.begin(), corners.end());
@@ -213,8 +212,8 @@ class Repair {
     return result;
   }
 
-  /// Makes the change that leaves the fewest cells not simple, of equals the first, if it leaves fewer than
-  /// there were. Returns whether it made one.
+  /// Makes the change that leaves the fewest cells not simple (of several equal ones, the first), if it
+  /// reduces their number. Returns true if it made a change.
   bool better(const Place& cell) {
     std::optional<Change> best;
     int least = 0;
@@ -276,8 +275,8 @@ CornerLabels corner_labels(const LabelledSolid& solid, const LabelledSolid::Plac
 bool is_simple(const LabelledSolid& solid, const LabelledSolid::Place& cell) {
   const CornerLabels labels = corner_labels(solid, cell);
   if (!has_cut(labels)) return true;
-  // The three conditions of label_repair.h. A pinched face counts only if the cell beside is a joint that is
-  // pinched there, too: against a cell without a cut the surface can be held to the segments.
+  // The three conditions of label_repair.h. A pinched face counts only if the cell beyond it is a joint in
+  // which it is also pinched: at a cell without a cut the surface can be constrained to the segments.
   const JointSheets own = joint_sheets(labels);
   if (!own.single_loops || (own.sheets.sheets > 1 && solid.one_sheet.contains(solid.key(cell)))) return false;
   for (int face = 0; face < 6; ++face) {

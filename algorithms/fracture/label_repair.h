@@ -1,56 +1,54 @@
 // Changes few labels so that the joint mesh of all pieces is manifold piece by piece.
 //
 // A lattice edge whose ends are in two different pieces is a *cut*; a cell with a cut is a *joint* and gets a
-// point for each of its sheets (label_sheets.h). A cell is **simple** if it has no cut, or if all of this
-// holds:
-//   - each sheet bounds each label, the outside included, in one loop at most;
-//   - no face between it and another joint is pinched, that is, ambiguous with both its segments in one sheet
-//   in each of the
-//     two cells;
-//   - it has one sheet, if that is asked of it (LabelledSolid::one_sheet).
+// vertex for each of its sheets (label_sheets.h). A cell is **simple** if it has no cut, or if all of the
+// following hold:
+//   - each sheet bounds each label, the outside included, in at most one loop;
+//   - no face between it and another joint is pinched, i.e. ambiguous with both its segments in one sheet in
+//     each of the two cells;
+//   - it has one sheet, if LabelledSolid::one_sheet requires it.
 //
-// **What labels and sheets must fulfil.** A piece is bounded by the polygons of the lattice edges of which
-// one end is in it. It is closed and manifold if all of this holds:
-//   1. The two cells beside a face draw the same lines on it. None, two or four of the face's edges bound the
-//      piece. Two hang together by the lines, four are paired by two segments.
-//   2. Where four do, the two segments belong to different sheets in at least one of the two cells, or the
-//   polygons are held
-//      to them (uniform_mesh.h, sheet_trials.h).
-//   3. Each sheet of a cell bounds the piece in one loop at most.
-// Two polygons of the piece share the segment between the points of two cells if their two edges lie in the
-// common face of these cells and bound the piece. By 1 and 2 each such segment has two such polygons: the
-// piece is closed. By 3 those around a point are one fan. A polygon between two pieces belongs to both, with
-// opposite orientation; any other faces the outside and belongs to one. So in the sum over all pieces the
-// seams cancel: the areas of contact agree, and what is left is a closed surface, whose volume the volumes of
-// the pieces add up to. That no two polygons meet is proved without a look at what lies on their sides
-// (uniform_mesh.h).
+// **Conditions on labels and sheets.** A piece is bounded by the polygons of the lattice edges that have
+// exactly one end in it. It is closed and manifold if all of the following hold:
+//   1. The two cells next to a face draw the same lines on it. None, two or four of the face's edges bound
+//      the piece. Two such edges are connected by the lines; four are paired by two segments.
+//   2. Where four edges bound the piece, the two segments belong to different sheets in at least one of the
+//      two cells, or the polygons are constrained to the segments (uniform_mesh.h, tested_polygons.h).
+//   3. Each sheet of a cell bounds the piece in at most one loop.
+// Two polygons of the piece share the segment between the vertices of two cells if their two edges lie in the
+// common face of these cells and bound the piece. By 1 and 2 each such segment has exactly two such polygons,
+// so the piece is closed. By 3 the polygons around a vertex form one fan. A polygon between two pieces
+// belongs to both, with opposite orientations; every other polygon faces the outside and belongs to one
+// piece. In the sum over all pieces the seams therefore cancel: the contact areas agree, and the remaining
+// polygons form a closed surface whose volume is the sum of the volumes of the pieces. The proof that no two
+// polygons intersect does not depend on the labels on their sides (uniform_mesh.h).
 //
-// **Why simple cells fulfil it.** 1: A face with a cut lies between two joints, which draw what
-// label_sheets.h says of the face's labels. A face without a cut is drawn as in Hermite data; where it is
-// ambiguous and a joint lies beside it, its inside corners are cut off in both cells.
-//   Joints: 2 and 3 are what makes them simple; where the cell beyond the face is no joint, its polygons can
-//   be held to the
-// face's segments.
-//   A cell without a cut has the loops of cell_sheets.h. What hangs together of its inside corners by edges
-// is of one piece. But a loop goes around what hangs together by edges *and across ambiguous faces whose
-// inside is joined*, as normals may have it. The two corners of such a face may well be of two pieces without
-// a cut anywhere near: a thin plate aslant in the lattice holds samples that are neighbours across faces
-// only. One loop would bound both pieces then, and each of them would be open. So only faces whose inside
-// corners are of one piece are joined (CellGrid::is_of_one_piece), and pieces come apart at the others, with
-// a gap of less than a voxel in place of a seam. Now each loop bounds one piece, which is 3; and of 2 there
-// is nothing to ask at a face between two pieces, for its segments are of two loops. At other faces without a
-// joint cell_blocks.h sees to it.
+// **Why simple cells satisfy the conditions.** 1: A face with a cut lies between two joints, which both draw
+// the lines that label_sheets.h defines for the face's labels. A face without a cut is drawn as in Hermite
+// data; where it is ambiguous and next to a joint, its inside corners are cut off in both cells.
+//   Joints: 2 and 3 follow from the definition of a simple cell; where the cell beyond the face is not a
+//   joint, its polygons can be constrained to the face's segments.
+//   A cell without a cut has the loops of cell_sheets.h. Inside corners that edges connect belong to one
+//   piece. But a loop encloses the corners that are connected by edges *and across ambiguous faces whose
+//   inside is joined*, depending on the normals. The two corners of such a face may belong to two pieces with
+//   no cut nearby: a thin plate oblique to the lattice contains samples that are neighbours across faces
+//   only. One loop would then bound both pieces, and each of them would be open. So only faces whose inside
+//   corners belong to one piece are joined (CellGrid::is_of_one_piece), and pieces separate at the others,
+//   with a gap of less than a voxel instead of a seam. Now each loop bounds one piece, which is 3; and 2
+//   cannot fail at a face between two pieces, because its segments belong to two loops. At other faces
+//   without a joint cell_blocks.h ensures 2.
 //
 // Where the surface between two pieces meets the original surface at a small angle, both pass through the
-// same cells near the line where they meet, without meeting in them. Such a cell has two sheets, and no label
-// needs to change.
+// same cells near their intersection line without intersecting in these cells. Such a cell has two sheets,
+// and no label needs to change.
 //
-// **Why it ends.** Only labels of inside samples change, and none becomes 0, so the surface of the whole
-// stays. First, a change is made only if it leaves fewer cells that are not simple, a number that cannot fall
-// for ever. What is still not simple then, is changed only towards lower labels: if no such change makes a
-// cell simple, each of its sets of inside corners that edges of the cell connect gets the lowest of its
-// labels, after which the cell has no cut. A cell that is not simple has a cut, so such a set has two labels
-// and some label becomes lower; the sum of all labels cannot fall for ever either.
+// **Termination.** Only labels of inside samples change, and none becomes 0, so the surface of the whole
+// solid is unchanged. First, a change is made only if it reduces the number of cells that are not simple,
+// which cannot decrease for ever. Cells that are still not simple afterwards are changed only towards lower
+// labels: if no such change makes a cell simple, each of its sets of inside corners that edges of the cell
+// connect gets the lowest of its labels, after which the cell has no cut. A cell that is not simple has a
+// cut, so such a set has two labels and some label becomes lower; the sum of all labels cannot decrease for
+// ever either.
 #pragma once
 
 #include <cstdint>
@@ -64,7 +62,7 @@ namespace hermesh {
 /// The labels of the corners of a cell whose first corner lies in one of the solid's blocks. Corners that no
 /// block holds have label 0.
 CornerLabels corner_labels(const LabelledSolid& solid, const LabelledSolid::Place& cell);
-/// Whether a cell, whose first corner lies in one of the solid's blocks, is simple as said above.
+/// Returns true if a cell, whose first corner lies in one of the solid's blocks, is simple as defined above.
 bool is_simple(const LabelledSolid& solid, const LabelledSolid::Place& cell);
 
 struct RepairReport {

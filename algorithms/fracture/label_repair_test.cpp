@@ -13,7 +13,7 @@
 #include "algorithms/hermite/test_lattice.h"
 
 namespace hermesh {
-namespace {
+namespace label_repair_test {
 
 /// Any function of the sample as code, without surfaces.
 class CodeFunction : public Cutters {
@@ -70,7 +70,7 @@ TEST(LabelRepair, EndsOnNoiseAndTouchesNoOutside) {
     for (std::int32_t b = 0; b < static_cast<std::int32_t>(before.size()); ++b)
       for (int i = 0; i < 512; ++i)
         ASSERT_EQ(solid.labels(b, i) > 0, test(before[static_cast<std::size_t>(b)].inside, i));
-    // What is simple stays so when pieces get other numbers.
+    // Simple cells remain simple when pieces are renumbered.
     settle_components(solid, {.split = false, .least_samples = 0}, context);
     ASSERT_TRUE(all_simple(solid));
   }
@@ -83,8 +83,8 @@ TEST(LabelRepair, LeavesAPlaneWallAlone) {
   EXPECT_EQ(repair_labels(solid, context).changed_samples, 0u);
 }
 
-/// A ball and a wall nearly tangent to it: beside the rim cells have two sheets, one of the ball and one of
-/// the wall.
+/// A ball and a wall nearly tangent to it: next to the boundary of the cut, cells have two sheets, one of the
+/// ball and one of the wall.
 LabelledSolid ball_with_a_slanting_wall(double height) {
   return labelled(ball(12, 12, 12, 10.3), [=](int x, int y, int z) {
     return 0.21 * (x - 12) + 0.13 * (y - 12) + (z - 12) > height ? 1u : 0u;
@@ -130,7 +130,7 @@ TEST(LabelRepair, LeavesOneSheetWhereThatIsAsked) {
     EXPECT_FALSE(solid.one_sheet.contains(LabelledSolid::key(cell)));
 }
 
-/// Whether every edge is passed once either way, and the triangles around every point are one fan.
+/// Succeeds if every edge is used once in each direction and the triangles around every vertex form one fan.
 testing::AssertionResult is_closed_manifold(const std::vector<Triangle>& triangles) {
   std::map<std::pair<std::uint32_t, std::uint32_t>, std::uint32_t>
       next;  // by directed edge, the third corner
@@ -194,7 +194,8 @@ void expect_balls(const std::vector<std::vector<Triangle>>& pieces, std::size_t 
   }
 }
 
-/// What is nearer than `radius` to the rectangle with a corner and two sides, which are at right angles.
+/// The positions nearer than `radius` to the rectangle with a corner and two sides, which are at right
+/// angles.
 Solid plate(const Eigen::Vector3d& corner, const Eigen::Vector3d& side, const Eigen::Vector3d& other,
             double radius) {
   return [=](double x, double y, double z) {
@@ -207,10 +208,10 @@ Solid plate(const Eigen::Vector3d& corner, const Eigen::Vector3d& side, const Ei
 }
 
 TEST(JointMesh, PartsTwoPiecesThatHangTogetherAcrossFacesOnly) {
-  // Four samples are the whole solid, a thin plate: two lattice edges that lie opposite each other in one
-  // cell. The normals join them across the cell's two faces at the edges' ends, so that the cell has two
-  // sheets, each of which goes along both edges; and no cell has a cut, even if the two edges are of two
-  // pieces. (One ambiguous face alone is not joined: it would be pinched in both of its cells.)
+  // The whole solid is four samples that form a thin plate: two opposite lattice edges of one cell. The
+  // normals join them across the cell's two faces at the ends of the edges, so that the cell has two sheets,
+  // each of which passes along both edges; and no cell has a cut, even if the two edges belong to two pieces.
+  // (A single ambiguous face is not joined: it would be pinched in both of its cells.)
   for (int axis = 0; axis < 3; ++axis)
     for (const int turn : {1, -1}) {
       SCOPED_TRACE(std::to_string(axis) + " " + std::to_string(turn));
@@ -261,10 +262,10 @@ TEST(LabelComponents, SplitWhatHangsTogetherNowhere) {
 }
 
 TEST(LabelComponents, SliversJoinTheNeighbourThatTheyShareMostWith) {
-  // Of the box 2 … 18 the layer x = 2 is a sliver between nothing and what is behind it; half of it is 16 ×
-  // 16 samples.
+  // In the box 2 … 18 the layer x = 2 is a sliver between the outside and the samples behind it; half of it
+  // is 16 × 16 samples.
   LabelledSolid solid = labelled(box(10, 10, 10, 8.5, 8.5, 8.5), [](int x, int y, int) -> CutCode {
-    if (x == 2 && y < 5) return 9;  // 3 × 17 samples beside code 1, 17 beside code 2
+    if (x == 2 && y < 5) return 9;  // 3 × 17 samples next to code 1, 17 next to code 2
     return x == 2 ? 2 : 1;
   });
   RunContext context;
@@ -285,5 +286,5 @@ TEST(LabelComponents, ASmallPieceWithoutNeighbourIsKept) {
   EXPECT_EQ(solid.piece_count(), 1u);
 }
 
-}  // namespace
+}  // namespace label_repair_test
 }  // namespace hermesh

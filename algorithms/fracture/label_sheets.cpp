@@ -5,7 +5,8 @@
 namespace hermesh {
 namespace {
 
-/// The numbers of cell_sheets.h as tables, for a repair asks for sheets very often: an edge's two corners.
+/// The numbering of cell_sheets.h as tables, because a repair computes sheets very often: an edge's two
+/// corners.
 constexpr std::array<std::array<int, 2>, 12> kCornersOfEdge = [] {
   std::array<std::array<int, 2>, 12> result{};
   for (int edge = 0; edge < 12; ++edge) {
@@ -29,9 +30,10 @@ constexpr std::array<std::array<int, 4>, 6> kFaceCorners = [] {
 /// or 1 (with corner 3). `l` holds the labels in the order of face_corners().
 int cut_off(const std::array<std::uint32_t, 4>& l) {
   // Both diagonals are alike: inside corners are cut off against the outside, corners 00 and 11 between two
-  // pieces. Which label is the lower is not asked, so the sheets stay when pieces get other numbers.
+  // pieces. This does not depend on the order of the labels, so renumbering the pieces does not change the
+  // sheets.
   if (l[0] == l[2] && l[1] == l[3]) return l[0] == 0 ? 1 : 0;
-  // One diagonal is alike and hangs together; the ends of the other are cut off.
+  // One diagonal is alike and connected; the ends of the other are cut off.
   return l[0] == l[2] ? 1 : 0;
 }
 
@@ -44,7 +46,7 @@ class Sheets {
     // Edges start as groups of their own; the lines on the faces unite them into sheets.
     for (int face = 0; face < 6; ++face) cut_face(face);
     number_sheets();
-    // Whether the two segments of a face are of one sheet shows only when all faces are cut.
+    // All faces must be cut before it is known if the two segments of a face belong to one sheet.
     for (int face = 0; face < 6; ++face) {
       const auto& edges = kFaceEdges[face];
       if (((sheets().ambiguous_faces >> face) & 1) &&
@@ -62,13 +64,14 @@ class Sheets {
   bool is_crossed(int edge) const {
     return labels_[kCornersOfEdge[edge][0]] != labels_[kCornersOfEdge[edge][1]];
   }
-  /// Whether an edge has one end of this label: then the boundary of the label's piece passes through it.
+  /// Returns true if exactly one end of an edge has this label: then the boundary of the label's piece passes
+  /// through the edge.
   bool bounds(int edge, std::uint32_t label) const {
     return (labels_[kCornersOfEdge[edge][0]] == label) != (labels_[kCornersOfEdge[edge][1]] == label);
   }
 
-  /// Makes one group of two. With twelve edges a pass over all is cheap; the lowest edge stands for its
-  /// group.
+  /// Unites two groups. With twelve edges a pass over all is cheap; the lowest edge is the group's
+  /// representative.
   void unite(int a, int b) {
     const int low = std::min(group_[a], group_[b]), high = std::max(group_[a], group_[b]);
     for (int& g : group_)
@@ -104,15 +107,15 @@ class Sheets {
     sheets().sheet_of.fill(CellSheets::kNone);
     for (int edge = 0; edge < 12; ++edge) {
       if (!is_crossed(edge)) continue;
-      // Edges ascend and the lowest stands for its group, so its number is there when the others look it up.
+      // Edges ascend and the lowest represents its group, so its number is set before the others look it up.
       const int first = group_[edge];
       sheets().sheet_of[edge] = first == edge ? sheets().sheets++ : sheets().sheet_of[first];
     }
   }
 
   /// The other end of the line on a face that starts at this edge and bounds the label. If two edges of the
-  /// face bound it, it is the other one, across a star, too; if four do, the face is ambiguous and the
-  /// segment tells.
+  /// face bound the label, it is the other one, even across a star; if four do, the face is ambiguous and its
+  /// segment gives the other end.
   int next(int face, int edge, std::uint32_t label) const {
     int count = 0, other = -1;
     for (const int e : kFaceEdges[face])

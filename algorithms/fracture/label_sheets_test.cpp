@@ -7,7 +7,7 @@
 #include <vector>
 
 namespace hermesh {
-namespace {
+namespace label_sheets_test {
 
 /// Every way to divide the corners among labels, the first corner's being `first`; 4140 of them.
 std::vector<CornerLabels> all_patterns(std::uint32_t first) {
@@ -54,13 +54,13 @@ TEST(LabelSheets, KnownByHand) {
   expect({0, 2, 0, 2, 2, 2, 2, 1}, {2, true, 0b001000, 0});
   // The wall meets the surface at corners 1 and 4 twice, with 2 in between on the lower face of y.
   expect({0, 2, 0, 1, 2, 1, 1, 1}, {1, true, 0b000100, 0b000100});
-  // 1 at two opposite corners: two sheets. Across a face they are cut off one by one in this face (corners 0
-  // and 3 are the face's 00 and 11), and hang together in that one (1 and 2).
+  // Label 1 at two opposite corners: two sheets. Across a face the corners are cut off one by one in one case
+  // (corners 0 and 3 are the face's 00 and 11) and connected in the other (1 and 2).
   expect({1, 2, 2, 2, 2, 2, 2, 1}, {2, true, 0, 0});
   expect({1, 2, 2, 1, 2, 2, 2, 2}, {2, true, 0b010000, 0});
   expect({2, 1, 1, 2, 2, 2, 2, 2}, {1, true, 0b010000, 0b010000});
-  // A ring of 1 about the cell, beside 2 on one side and 3 on the other: 1 is bounded by two loops, in two
-  // sheets.
+  // A ring of label 1 around the cell, next to 2 on one side and 3 on the other: 1 is bounded by two loops,
+  // in two sheets.
   expect({2, 1, 1, 1, 1, 1, 1, 3}, {2, true, 0, 0});
   // 1 at two corners across the cell, with three labels meeting all about them: two loops in one sheet.
   expect({1, 2, 3, 3, 2, 2, 3, 1}, {1, false, 0, 0});
@@ -81,7 +81,7 @@ TEST(LabelSheets, AreThoseOfSignsWhereAllIsOfOnePiece) {
   }
 }
 
-/// A face's segments as places in face_edges(), −1 for none.
+/// A face's segments as indices in face_edges(), −1 for none.
 std::array<int, 4> segments(const JointSheets& joint, int face) {
   const std::array<int, 4> edges = face_edges(face);
   std::array<int, 4> result{};
@@ -138,5 +138,5 @@ TEST(LabelSheets, HoldWhatHangsTogetherOnTheFaces) {
   }
 }
 
-}  // namespace
+}  // namespace label_sheets_test
 }  // namespace hermesh

@@ -15,7 +15,7 @@ LabelledGrid::LabelledGrid(LabelledSolid& solid, const FloatHermite& hermite, co
       first_(solid.blocks.size()) {
   const Stage stage(context, "crossings of the cuts");
   // Count, scan, fill (parallel.h): each block writes its own range of crossings and sides, so no two threads
-  // write the same place, and the order is that of block, axis and sample whatever the number of threads.
+  // write the same element, and the order is that of block, axis and sample at any number of threads.
   find_edges(context);
   std::vector<std::uint64_t> made_up(solid.blocks.size());
   parallel_blocks(solid.blocks.size(), context,
@@ -46,8 +46,8 @@ void LabelledGrid::find_edges(RunContext& context) {
       }
     }
     solid_.blocks[b].count_before();
-    // Joints of one point and no ambiguous face need not be told (CellGrid::joint_sheets()). Most are such,
-    // so the lists stay short.
+    // Joints with one vertex and no ambiguous face need not be listed (CellGrid::joint_sheets()). Most joints
+    // are of this kind, so the lists are short.
     for (int cell = 0; cell < 512; ++cell) {
       const CornerLabels labels = labels_in(cube, cell);
       if (!has_cut(labels)) continue;
@@ -86,9 +86,8 @@ std::uint64_t LabelledGrid::fill_block(std::size_t b, const FloatHermite& hermit
         crossing = *original++;
         return;
       }
-      // First the codes of the samples: the cutter's own surface passes between them. If a repair or a merge
-      // gave a sample to another piece, the codes may be one and the same; then those of the two pieces are
-      // asked.
+      // First try the codes of the samples: the cutter's own surface passes between them. If a repair or a
+      // merge assigned a sample to another piece, both codes may be equal; then try those of the two pieces.
       const std::uint32_t codes[2][2] = {{solid_.codes(block, sample), solid_.codes(next.block, next.sample)},
                                          {solid_.code_of[from], solid_.code_of[to]}};
       for (const auto& [first, second] : codes) {
@@ -149,9 +148,9 @@ std::size_t LabelledGrid::memory_bytes() const {
 
 namespace {
 
-/// Returns whether the surface leaves nothing but a point of a face between its two inside corners, as where
-/// the solid touches itself in an edge: whether the lines in which the planes of the crossings beside either
-/// corner meet the face intersect in one point of the face.
+/// Returns true if the surface leaves only a point of a face between its two inside corners, as where the
+/// solid touches itself in an edge, i.e. if for both corners the planes of the two crossings next to the
+/// corner intersect the face in lines that meet in the same point of the face.
 bool touches_in_a_point(const CellBlocks& cells, std::int32_t block, int cell, int face, int inside) {
   constexpr double kNear = 0.01;  // voxels
   const std::array<int, 4> edges = face_edges(face);
@@ -169,8 +168,8 @@ bool touches_in_a_point(const CellBlocks& cells, std::int32_t block, int cell, i
     }
     return Eigen::Vector2d(normals.inverse() * distances);
   };
-  // Two walls that face each other at a small angle have one line of intersection, too, but far away. That of
-  // parallel ones is not finite, and near nothing.
+  // Two walls that face each other at a small angle also have a line of intersection, but far away. For
+  // parallel walls its position is not finite, so the comparisons below are false.
   const Eigen::Vector2d first = tip(inside), second = tip(inside + 2);
   return (first - second).norm() < kNear && first.minCoeff() > -kNear && first.maxCoeff() < 1.0 + kNear;
 }

@@ -1,4 +1,4 @@
-// The edges at which the pieces of a solid end, with the crossing on each: what the joint mesh is made from.
+// The edges at which the pieces of a solid end, with the crossing on each: the input of the joint mesh.
 #pragma once
 
 #include <cstdint>
@@ -10,7 +10,7 @@
 
 namespace hermesh {
 
-/// What lies on the two sides of a crossing edge.
+/// The pieces, or the outside, on the two sides of a crossing edge.
 struct EdgeSides {
   std::uint32_t back;   ///< the piece behind the edge's polygons, whose boundary they are; at least 1
   std::uint32_t front;  ///< the piece that the polygons face; 0 for the outside
@@ -20,10 +20,10 @@ struct EdgeSides {
 
 /// The lattice of a labelled solid. An edge is crossed if its ends have different labels. Crossings of the
 /// original surface are those of the Hermite data. The crossing of a cut is that of the cutters' surface
-/// between the codes of the two samples; if there is none, that between the codes of the two pieces. If there
-/// is none either, because a label was repaired or a sliver merged, the crossing is *made up*, and counted:
-/// the end of the edge that the surface between the two pieces is nearer to, or, if the cutters cannot tell,
-/// the middle of the edge with a normal along it.
+/// between the codes of the two samples; if there is none, that between the codes of the two pieces. If that
+/// is missing, too, because a label was repaired or a sliver merged, the crossing is *made up*, and counted:
+/// it is the end of the edge nearer to the surface between the two pieces or, if the cutters cannot determine
+/// that, the middle of the edge with a normal along it.
 class LabelledGrid : public CellGrid {
  public:
   /// Marks the crossing edges in the solid's blocks, too. The solid has to outlive the grid, and its labels

@@ -9,8 +9,8 @@ namespace hermesh {
 JointMesh joint_mesh(const LabelledGrid& grid, const DualContouringOptions& options, RunContext& context) {
   const FilePoints file(grid.placement());
   PolygonEdges edges;
-  // uniform_mesh() asks nothing of what lies on the two sides of an edge, so one call makes the polygons of
-  // all pieces, each seam once; `edges` tells which edge a polygon came from, and the edge knows its sides.
+  // uniform_mesh() does not depend on the pieces on the two sides of an edge, so one call makes the polygons
+  // of all pieces, each seam once; `edges` maps each polygon to its edge, which stores its sides.
   UniformMesh uniform = uniform_mesh(grid, options, file, context, &edges);
   const Stage stage(context, "sides of the triangles");
   JointMesh mesh;
@@ -22,7 +22,8 @@ JointMesh joint_mesh(const LabelledGrid& grid, const DualContouringOptions& opti
   mesh.escaped = uniform.counts.escaped;
   for (const auto& [block, cell] : uniform.counts.meeting_joints)
     mesh.meeting_joints.push_back({block, cell});
-  // Triangles of fanned edges come first, then each quad as two, abc and acd: the split that its maker chose.
+  // Triangles of fanned edges are first, followed by each quad as two triangles, abc and acd, i.e. with the
+  // split chosen for it.
   const std::size_t fanned = uniform.triangles.size(), quads = uniform.quads.size();
   mesh.triangles = std::move(uniform.triangles);
   mesh.triangles.resize(fanned + 2 * quads);
@@ -33,7 +34,7 @@ JointMesh joint_mesh(const LabelledGrid& grid, const DualContouringOptions& opti
       for (std::size_t i = chunk * kChunk; i < std::min(n, (chunk + 1) * kChunk); ++i) f(i);
     });
   };
-  // Each polygon writes its own places only, so threads do not meet.
+  // Each polygon writes only its own elements, so threads do not conflict.
   in_chunks(fanned, [&](std::size_t i) { mesh.sides[i] = grid.sides(edges.triangles[i]); });
   in_chunks(quads, [&](std::size_t i) {
     const Quad& q = uniform.quads[i];
@@ -50,7 +51,7 @@ PieceTriangles::PieceTriangles(const JointMesh& mesh, std::uint32_t pieces) : fi
     ++first_[sides.back];
     if (sides.front > 0) ++first_[sides.front];
   }
-  // Counts become first places; the entry after the last piece ends it, and that of piece 0 is empty.
+  // Convert counts to first indices; the entry after the last piece ends it, and that of piece 0 is empty.
   std::size_t sum = 0;
   for (std::size_t& first : first_) {
     const std::size_t here = first;
@@ -67,9 +68,9 @@ PieceTriangles::PieceTriangles(const JointMesh& mesh, std::uint32_t pieces) : fi
 }
 
 PolygonMesh piece_mesh(const JointMesh& mesh, std::span<const PieceTriangles::Side> triangles) {
-  // A piece's points ascend as in the joint mesh, so both pieces of a seam number its points in the same
-  // order. The coordinates are the same bits in both, for rounding to single precision knows nothing of
-  // pieces.
+  // A piece's vertices have the same order as in the joint mesh, so both pieces of a seam number its vertices
+  // in the same order. The coordinates have the same bits in both, because rounding to single precision does
+  // not depend on the piece.
   std::vector<std::uint32_t> used;
   used.reserve(3 * triangles.size());
   for (const PieceTriangles::Side& side : triangles)

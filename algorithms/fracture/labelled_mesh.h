@@ -1,4 +1,4 @@
-// The joint mesh of all pieces at the finest level: every seam once, with what lies on its two sides.
+// The joint mesh of all pieces at the finest level: every seam once, with the pieces on its two sides.
 #pragma once
 
 #include <Eigen/Core>
@@ -12,13 +12,15 @@
 
 namespace hermesh {
 
-/// The mesh of all pieces together: one point for each sheet of a cell, and triangles for each crossing edge.
+/// The mesh of all pieces together: one vertex for each sheet of a cell, and triangles for each crossing
+/// edge.
 ///
-/// **Guarantees**, if every cell of the grid is simple (label_repair.h) and no joints meet: the triangles
-/// with a piece on one side, turned so that it is behind them, are a closed oriented manifold; the triangles
-/// of all pieces meet in nothing but the edges and points that they share (uniform_mesh.h). So each piece is
-/// free of self-intersections, no two of them overlap, and what lies between two pieces is the same triangles
-/// in both. All of it holds for points as a file has them.
+/// **Guarantees**, if every cell of the grid is simple (label_repair.h) and `meeting_joints` is empty: the
+/// triangles with a piece on one side, oriented so that the piece is behind them, are a closed oriented
+/// manifold; the triangles of all pieces intersect only in the edges and vertices that they share
+/// (uniform_mesh.h). So each piece is free of self-intersections, no two pieces overlap, and the interface
+/// between two pieces consists of the same triangles in both. All of this holds for the coordinates as
+/// written to a file.
 struct JointMesh {
   IndexToWorld placement;
   std::vector<Eigen::Vector3d>
@@ -33,9 +35,9 @@ struct JointMesh {
   std::vector<LabelledSolid::Place> meeting_joints;  ///< as in UniformCounts
 };
 
-/// Makes the mesh of all pieces. A joint's point is placed by all crossings of the joint, so that the rim of
-/// a cut is a sharp crease where the original surface is smooth, too. The result has the same bytes at any
-/// thread count. @throws Cancelled.
+/// Makes the mesh of all pieces. The position of a joint's vertex depends on all crossings of the joint, so
+/// that the boundary of a cut is a sharp crease even where the original surface is smooth. The result has the
+/// same bytes at any thread count. @throws Cancelled.
 JointMesh joint_mesh(const LabelledGrid& grid, const DualContouringOptions& options, RunContext& context);
 
 /// Which triangles of a joint mesh bound each piece.
@@ -61,10 +63,10 @@ class PieceTriangles {
   std::vector<Side> sides_;
 };
 
-/// A piece as a mesh of its own. Points keep the order that they have in the joint mesh; all pieces have the
-/// placement's origin, so that files keep the seams exact. The polygon attributes `surface` (0 original, 1
-/// cut), `cutter` (−1 for the original surface, and for a cut that is no cutter's) and `neighbour` (the piece
-/// on the other side, −1 for the outside) tell the polygons apart.
+/// A piece as a mesh of its own. Vertices have the same order as in the joint mesh; all pieces have the
+/// placement's origin, so that files preserve the seams exactly. The polygons have the attributes `surface`
+/// (0 original, 1 cut), `cutter` (−1 for the original surface, and for a cut that belongs to no cutter) and
+/// `neighbour` (the piece on the other side, −1 for the outside).
 PolygonMesh piece_mesh(const JointMesh& mesh, std::span<const PieceTriangles::Side> triangles);
 
 }  // namespace hermesh

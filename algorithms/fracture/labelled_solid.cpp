@@ -25,7 +25,7 @@ std::vector<Lower> blocks_with_samples(const FloatHermite& hermite) {
     // Nothing is inside above the last leaf of a column, for the solid has an end.
     if (last) continue;
     // Where the layer beyond is mixed, the block above has a crossing edge: it is the next leaf, and no block
-    // lies between the two. Else one bit of the layer tells the sign of all.
+    // lies between the two. Otherwise one bit of the layer gives the sign of all samples.
     for (std::int32_t z = leaf.lower[2] + 8; z < hermite.leaves[i + 1].lower[2]; z += 8)
       result.push_back({leaf.lower[0], leaf.lower[1], z});
   }
@@ -39,7 +39,7 @@ std::vector<Lower> with_those_below(const std::vector<Lower>& blocks) {
   for (const Lower& b : blocks)
     for (int down = 0; down < 8; ++down)
       all.push_back({b[0] - 8 * (down & 1), b[1] - 8 * ((down >> 1) & 1), b[2] - 8 * (down >> 2)});
-  // Equal entries cannot be told apart, so an unstable sort gives the same list at any thread count.
+  // Equal entries are indistinguishable, so an unstable sort gives the same list at any thread count.
   tbb::parallel_sort(all.begin(), all.end());
   all.erase(std::unique(all.begin(), all.end()), all.end());
   return all;
@@ -48,10 +48,11 @@ std::vector<Lower> with_those_below(const std::vector<Lower>& blocks) {
 /// The codes of one block as numbers in a list of those that occur in it.
 struct BlockCodes {
   std::vector<CutCode> values;
-  LabelField::Values numbers{};  ///< 0 outside, else 1 + place in `values`
+  LabelField::Values numbers{};  ///< 0 outside, else 1 + index in `values`
 };
 
-/// Asks the cutters for one block. Only codes of inside samples are kept: what lies outside is no piece.
+/// Queries the cutters for one block. Only codes of inside samples are stored, because outside samples belong
+/// to no piece.
 BlockCodes codes_of_block(const ViewBlock& block, const Cutters& cutters) {
   std::array<CutCode, 512> codes;
   cutters.codes(block.lower, codes);
@@ -152,14 +153,14 @@ LabelledSolid whole_solid(const FloatHermite& hermite, RunContext& context) {
       block.inside = kAllInside;
     samples[b] = static_cast<std::uint64_t>(count(block.inside));
     LabelField::Values values{};
-    // All of one piece and one code, until label_by_codes() tells more.
+    // All samples have one piece and one code until label_by_codes() assigns others.
     for_each_bit(block.inside, [&](int i) { values[static_cast<std::size_t>(i)] = 1; });
     solid.labels.assign(static_cast<std::int32_t>(b), values);
     solid.codes.assign(static_cast<std::int32_t>(b), values);
   });
   for (const std::uint64_t n : samples) solid.samples += n;
   find_neighbours(solid.blocks, context);
-  // Code 1 stands for the only piece; its value means nothing yet.
+  // Code 1 belongs to the only piece; its value is not used yet.
   solid.code_values = {0};
   solid.code_of = {0, 1};
   return solid;
@@ -185,7 +186,8 @@ void label_by_codes(LabelledSolid& solid, const Cutters& cutters, RunContext& co
     solid.code_values.erase(std::unique(solid.code_values.begin(), solid.code_values.end()),
                             solid.code_values.end());
   }
-  // Then a block's numbers become places in the ascending list of all, which no order of threads changes.
+  // Then convert a block's numbers to indices into the ascending list of all, which is independent of the
+  // thread schedule.
   parallel_blocks(n, context, [&](std::size_t b) {
     const auto block = static_cast<std::int32_t>(b);
     // `codes` holds the block's own numbers here, and those of the whole list from here on.

@@ -49,7 +49,7 @@ struct LabelledSolid {
   /// begins in one of them; ascending. Samples of no block are outside. In each block `leaf` is that of
   /// the Hermite data, and `crossing` is empty until a LabelledGrid is made.
   HermiteView::Blocks blocks;
-  /// The cutters' code of each sample: 0 outside, else 1 + its place in `code_values`. Repairs and merges
+  /// The cutters' code of each sample: 0 outside, else 1 + its index in `code_values`. Repairs and merges
   /// change labels, never codes.
   LabelField codes;
   std::vector<CutCode> code_values;    ///< codes that occur, ascending
@@ -61,7 +61,7 @@ struct LabelledSolid {
 
   /// A sample, which is outside where no block holds it, or the cell whose first corner it is.
   using Place = LatticePlace;
-  /// One number for a place in a block; ascending numbers are ascending places.
+  /// Encodes a Place as one number; the numbers have the same order as the Places.
   static std::uint64_t key(const Place& at) {
     return static_cast<std::uint64_t>(at.block) << 9 | static_cast<std::uint64_t>(at.sample);
   }
@@ -76,7 +76,7 @@ struct LabelledSolid {
   };
   std::vector<JoinedFace> joined_faces;  ///< empty until find_joined_faces() of labelled_grid.h fills it
 
-  /// The sample at local coordinates of a block, each from −8 to 15, in the block or one beside it.
+  /// The sample at local coordinates of a block, each from −8 to 15, in the block or one next to it.
   Place locate(std::int32_t block, int x, int y, int z) const {
     return hermesh::locate(blocks[static_cast<std::size_t>(block)].neighbours, x, y, z);
   }

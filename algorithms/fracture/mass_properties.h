@@ -1,4 +1,4 @@
-// What a piece weighs, and how it turns.
+// Mass properties of a piece: volume, area, centre of mass and inertia tensor.
 #pragma once
 
 #include <Eigen/Core>

@@ -31,14 +31,15 @@ PolygonMesh in_index_space(const PolygonMesh& mesh, const IndexToWorld& placemen
   for (std::size_t i = 0; i < mesh.points.size(); ++i)
     result.points.push_back(
         Vector3d(to_index * (mesh.world(i) - placement.origin - placement.offset) + base).cast<float>());
-  // A mirrored lattice turns triangles inside out; turned about, their normals lead outwards in index space.
+  // A mirrored lattice turns triangles inside out; flip them so that their normals point outwards in index
+  // space.
   if (placement.mirrors())
     for (Triangle& t : result.triangles) std::swap(t[1], t[2]);
   return result;
 }
 
-/// Keeps the Hermite data of all cutting solids on the object's lattice. Where the thesis (§7.1) takes each
-/// cutter's difference from the object before the next one's turn, here the codes tell who comes first.
+/// Stores the Hermite data of all cutting solids on the object's lattice. The thesis (§7.1) subtracts each
+/// cutter from the object before applying the next one; here the codes define the order of the cutters.
 class MeshCutters : public Cutters {
  public:
   MeshCutters(const std::vector<CuttingMesh>& meshes, const IndexToWorld& placement, RunContext& context) {
@@ -58,8 +59,8 @@ class MeshCutters : public Cutters {
   }
 
   std::optional<CutCrossing> crossing(const At& at, int axis, CutCode first, CutCode second) const override {
-    // What lies between the two is the surface of the one that comes first, for the other has only what that
-    // left.
+    // The interface is the surface of the earlier cutter, because the later one receives only samples that
+    // the earlier one does not contain.
     const std::size_t k = std::min(first, second);
     if (k >= solids_.size() || !solids_[k]) return std::nullopt;
     // An edge belongs to its first sample's leaf; without a leaf no edge that starts there is crossed.
@@ -68,7 +69,8 @@ class MeshCutters : public Cutters {
     const int sample = sample_index(at[0] & 7, at[1] & 7, at[2] & 7);
     const std::array<BlockMask, 3> edges = crossing_edges(*leaf);
     if (!test(edges[axis], sample)) return std::nullopt;
-    // Crossings lie by axis and then by sample: the place of one is its rank among the leaf's set bits.
+    // Crossings are sorted by axis and then by sample: the index of one is its rank among the leaf's set
+    // bits.
     std::size_t rank = leaf->first;
     for (int a = 0; a < axis; ++a) rank += static_cast<std::size_t>(hermesh::count(edges[a]));
     rank += rank_in(edges[axis], sample);
@@ -90,7 +92,7 @@ class MeshCutters : public Cutters {
   }
 
  private:
-  /// The samples of a block within cutter k, whatever the other cutters hold.
+  /// The samples of a block within cutter k, even those that other cutters also contain.
   BlockMask inside(std::size_t k, const At& lower) const {
     BlockMask mask{};
     if (!solids_[k]) return mask;
@@ -109,7 +111,8 @@ std::optional<FloatHermite> hermite_on_lattice(const PolygonMesh& mesh, const In
                                                RunContext& context) {
   if (mesh.empty()) return std::nullopt;
   const PolygonMesh turned = in_index_space(mesh, placement);
-  // A voxel of band is enough: the level set gives signs and tells where to look, the polygons give the hits.
+  // A band of one voxel is enough: the level set gives the signs and the edges to test, the polygons give the
+  // hits.
   const LevelSet level_set =
       hermesh_voxelizer({.mesh = turned,
                          .voxel_size = 1.0,
@@ -131,7 +134,7 @@ std::optional<FloatHermite> hermite_on_lattice(const PolygonMesh& mesh, const In
 PolygonMesh placed(const PolygonMesh& mesh, const Eigen::Matrix3d& rotation, double scale,
                    const Vector3d& centre, const Vector3d& place) {
   PolygonMesh result = mesh;
-  // Single precision is about the new place, so the copy is as exact there as the mesh was.
+  // Single precision is relative to the new position, so the copy is as exact there as the mesh was.
   result.origin = place;
   for (std::size_t i = 0; i < mesh.points.size(); ++i)
     result.points[i] = Vector3d(scale * (rotation * (mesh.world(i) - centre))).cast<float>();

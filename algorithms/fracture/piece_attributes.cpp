@@ -26,8 +26,8 @@ std::array<Vector3d, 2> frame_of(Vector3d normal) {
   return {u, normal.cross(u)};
 }
 
-/// The two coordinate axes other than the one along which the triangle's normal is greatest. The sign of the
-/// normal is not asked, so a seam's triangle has the same from both sides.
+/// The two coordinate axes other than the one along which the triangle's normal is greatest. They do not
+/// depend on the sign of the normal, so a seam's triangle has the same axes on both sides.
 std::array<Vector3d, 2> frame_of_triangle(const PolygonMesh& mesh, const Triangle& t) {
   const auto at = [&](int c) { return Vector3d(mesh.points[t[c]].cast<double>()); };
   int axis;
@@ -61,7 +61,8 @@ void take(const MeshAttribute& from, const std::array<std::size_t, 3>& elements,
   }
 }
 
-/// An attribute of the same kind for so many elements, all of them 0 or, of whole numbers, −1 (none).
+/// An attribute of the same kind with the requested number of elements, all of them 0 or, for whole numbers,
+/// −1 (none).
 MeshAttribute empty_like(const MeshAttribute& source, std::size_t elements) {
   MeshAttribute result{source.name, source.domain, source.components, {}, source.labels};
   const std::size_t values = elements * static_cast<std::size_t>(source.components);
@@ -81,7 +82,7 @@ void add_cut_uv(PolygonMesh& piece, const PlaneOfNeighbour& plane) {
   std::map<std::int32_t, std::optional<std::array<Vector3d, 2>>> frames;
   for (std::size_t t = 0; t < piece.triangles.size(); ++t) {
     if (surface[t] == 0) continue;
-    // The plane depends on the two pieces alone, so one frame does for all triangles of a seam.
+    // The plane depends only on the two pieces, so all triangles of a seam share one frame.
     auto [at, is_new] = frames.try_emplace(neighbour[t]);
     if (is_new)
       if (const auto normal = plane(neighbour[t])) at->second = frame_of(*normal);
@@ -143,8 +144,8 @@ void SourceAttributes::add_to(PolygonMesh& piece, RunContext& context) const {
     const auto same = [&](const MeshAttribute& a) { return a.name == attribute.name; };
     // An attribute that the piece has already is its own (`surface`, `cutter`, `neighbour`) and stays.
     const auto there = std::find_if(piece.attributes.begin(), piece.attributes.end(), same);
-    // Texture coordinates alone are merged: those of the source's points, too, go into the piece's corners,
-    // where seams need values of their own.
+    // Only texture coordinates are merged: those of the source's points are also written to the piece's
+    // corners, because their values differ at seams.
     const bool fills_uv = attribute.name == "uv" && attribute.domain != AttributeDomain::polygon &&
                           attribute.components == 2 && attribute.values.index() == 0;
     if (there != piece.attributes.end() && !fills_uv) continue;
@@ -173,8 +174,8 @@ void SourceAttributes::add_to(PolygonMesh& piece, RunContext& context) const {
   in_chunks(piece.triangles.size(), [&](std::size_t i) {
     if (surface[i] != 0) return;
     const Triangle& own = piece.triangles[i];
-    // One polygon of the source for all three corners: were each corner to look for its own, a triangle
-    // beside a seam of the source's texture might take corners from both sides of it.
+    // Use one polygon of the source for all three corners: with a separate query per corner, a triangle next
+    // to a seam of the source's texture could take corners from both sides of the seam.
     const std::uint32_t t = tree_->nearest((local(own[0]) + local(own[1]) + local(own[2])) / 3.0);
     for (std::size_t a = 0; a < from.size(); ++a) {
       MeshAttribute& target = piece.attributes[to[a]];

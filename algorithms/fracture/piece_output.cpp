@@ -3,7 +3,7 @@
 #include <Eigen/Geometry>
 #include <cmath>
 
-#include "algorithms/core/stopwatch.h"
+#include "algorithms/core/run_context.h"
 #include "algorithms/fracture/piece_attributes.h"
 
 namespace hermesh {
@@ -20,7 +20,7 @@ const std::vector<std::int32_t>* whole_numbers_if_any(const PolygonMesh& mesh, c
 
 void measure_piece(PieceOutput& piece) {
   piece.mass = mass_properties(piece.mesh);
-  // Pieces of methods without tags do not say what lies beyond their triangles.
+  // Pieces of methods without tags do not specify the pieces beyond their triangles.
   const auto* neighbour = whole_numbers_if_any(piece.mesh, "neighbour");
   if (!neighbour) return;
   for (std::size_t t = 0; t < piece.mesh.triangles.size(); ++t) {

@@ -1,4 +1,4 @@
-// The pieces of a fracture, one after the other, with what they carry and weigh.
+// Passes on the pieces of a fracture one after another, with their attributes and mass properties.
 #pragma once
 
 #include <cstdint>
@@ -30,9 +30,9 @@ using HandOver = std::function<void(PieceOutput&&)>;
 /// Fills in a piece's mass and neighbours from its mesh.
 void measure_piece(PieceOutput& piece);
 
-/// Breaks an object as labelled_fracture() does and hands its pieces over, without their measures and
-/// numbers, in the order of these: with texture coordinates on the cuts and the attributes of `source`, the
-/// polygons of the object, unless that is null. What is returned has no mesh and no pieces any more.
+/// Breaks an object as labelled_fracture() does and passes on its pieces, without their measures and numbers,
+/// in the order of these: with texture coordinates on the cuts and the attributes of `source`, the polygons
+/// of the object, unless that is null. The returned fracture no longer contains the mesh and the pieces.
 /// @throws Error and Cancelled as labelled_fracture() does.
 LabelledFracture labelled_pieces(const FloatHermite& object, const Cutters& cutters,
                                  const FractureOptions& options, const PolygonMesh* source,

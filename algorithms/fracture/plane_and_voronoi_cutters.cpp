@@ -36,8 +36,8 @@ class Places {
   double block_radius() const { return 3.5 * placement_.linear.colwise().norm().sum(); }
   double edge_length(int axis) const { return placement_.linear.col(axis).norm(); }
 
-  /// A crossing at `offset` of an edge; the normal need not be of unit length, and if it vanishes the edge's
-  /// direction takes its place.
+  /// A crossing at `offset` of an edge; the normal need not be of unit length, and if it vanishes it is
+  /// replaced by the edge's direction.
   EdgeCrossing crossing(double offset, const Vector3d& world_normal, int axis) const {
     // The transposed map turns covectors of the world into those of the grid.
     Vector3d n = placement_.linear.transpose() * world_normal;
@@ -87,8 +87,9 @@ class PlaneCutters : public Cutters {
   }
 
   std::optional<CutCrossing> crossing(const At& at, int axis, CutCode first, CutCode second) const override {
-    // Planes whose side differs, the lowest first. Sides are told as in codes(), so between the samples' own
-    // codes the first plane crosses the edge; codes of other samples may have none that does.
+    // Planes whose side differs, the lowest first. Sides are determined as in codes(), so between the
+    // samples' own codes the first plane crosses the edge; for codes of other samples there may be no such
+    // plane.
     for (CutCode left = first ^ second; left != 0; left &= left - 1) {
       const auto k = static_cast<std::size_t>(std::countr_zero(left));
       const double a = value(k, places_(at)), b = value(k, places_(at, Vector3d::Unit(axis)));

@@ -11,7 +11,7 @@ namespace {
 
 using Eigen::Vector3d;
 
-/// Draws inside samples, all equally likely, without a list of them: only sums by block are kept.
+/// Draws inside samples with equal probability without a list of them: only the sums per block are stored.
 class InsideSamples {
  public:
   explicit InsideSamples(const LabelledSolid& solid) : solid_(solid), first_(solid.blocks.size() + 1) {
@@ -20,8 +20,8 @@ class InsideSamples {
   }
   std::uint64_t size() const { return first_.back(); }
 
-  /// A world position within half a voxel, along each axis, of a random inside sample; beside the surface it
-  /// may lie outside the solid by that much.
+  /// A world position within half a voxel, along each axis, of a random inside sample; near the surface it
+  /// may lie outside the solid by that distance.
   Vector3d place(Random& random) const {
     const std::uint64_t wanted = random.below(size());
     // The last block whose first sample is not beyond the wanted one; blocks without inside samples are
@@ -50,8 +50,8 @@ class InsideSamples {
 
 std::vector<Vector3d> scatter(const LabelledSolid& solid, std::size_t count, const ScatterOptions& options,
                               RunContext& context) {
-  // More candidates make the spacing more even, and cost as much more: each is compared with all places so
-  // far. The tries end a search in a density that accepts next to nothing.
+  // More candidates make the spacing more even, at a proportional cost: each is compared with all positions
+  // so far. The limit on tries ends the search if the density accepts almost nothing.
   constexpr int kCandidates = 24;
   constexpr int kTries = 100'000;
   const Stage stage(context, "scatter");
@@ -75,16 +75,16 @@ std::vector<Vector3d> scatter(const LabelledSolid& solid, std::size_t count, con
       if (++tries > kTries) break;
       const Vector3d place = samples.place(random);
       const double density = options.density ? options.density(place) : 1.0;
-      // Accepted in proportion to the density. The generator is asked for one number after the other in this
-      // thread alone, so the seed decides everything.
+      // Accepted in proportion to the density. All random numbers are drawn in sequence in this thread only,
+      // so the result depends only on the seed.
       if (!(density > 0) || random.uniform() >= density) continue;
       ++candidate;
-      // Where places are to be n times as dense, their spacing is smaller by the cube root of n; scaled by
-      // it, distances compare between dense parts and sparse ones.
+      // Where positions are to be n times as dense, their spacing is smaller by the cube root of n; scaled by
+      // it, distances can be compared between dense and sparse parts.
       const double nearest = std::sqrt(tree.nearest(place)) * std::cbrt(density);
       if (nearest > farthest) farthest = nearest, best = place;
     }
-    // Nothing was accepted, or only places that are taken already: so all places differ.
+    // Nothing was accepted, or only positions that are already used; this ensures that all positions differ.
     if (!(farthest > 0))
       throw Error("only " + std::to_string(places.size()) + " of " + std::to_string(count) +
                   " places could be scattered: the density is nowhere above 0 inside the solid, or too low");

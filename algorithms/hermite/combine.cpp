@@ -1,8 +1,5 @@
 #include "algorithms/hermite/combine.h"
 
-#include <tbb/blocked_range.h>
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <bit>
 #include <cstring>
@@ -11,7 +8,8 @@
 #include <type_traits>
 #include <vector>
 
-#include "algorithms/hermite/with_normal_code.h"
+#include "algorithms/core/parallel.h"
+#include "algorithms/hermite/normal_codes.h"
 
 namespace hermesh {
 namespace {
@@ -19,33 +17,21 @@ namespace {
 using Lower = std::array<std::int32_t, 3>;
 using Leaves = LargeArray<SignLeaf>;
 
-/// Leaves of each operand in a chunk, about: some 0.1 ms of work, enough for a task, and small enough to go
-/// round.
+/// Approximate number of leaves of each operand in a chunk: about 0.1 ms of work, enough for a task.
 constexpr std::size_t kLeavesPerChunk = 512;
 constexpr std::size_t kCrossingsPerChunk = std::size_t{1} << 16;
-
-/// Calls f(i) for i in 0…n−1, each a task of its own.
-template <class F>
-void parallel_tasks(std::size_t n, const RunContext& context, F&& f) {
-  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, n), [&](const tbb::blocked_range<std::size_t>& range) {
-    for (std::size_t i = range.begin(); i < range.end(); ++i) {
-      context.check();
-      f(i);
-    }
-  });
-}
 
 // Leaves are in ascending order of (x, y, z), so those of a column along z follow one another.
 bool before(const SignLeaf& leaf, const Lower& lower) { return leaf.lower < lower; }
 
-/// Number of the first leaf that is not before `lower`, of all of them.
+/// Returns the number of the first leaf that is not before `lower`.
 std::size_t first_not_before(const Leaves& leaves, const Lower& lower) {
   return static_cast<std::size_t>(std::lower_bound(leaves.begin(), leaves.end(), lower, before) -
                                   leaves.begin());
 }
 
-/// Number of the first of the leaves `begin` to `end` that is not before `lower`, by doubling steps and then
-/// halving: the time grows with the logarithm of the distance to the answer.
+/// Returns the number of the first of the leaves `begin` to `end` that is not before `lower`, by doubling
+/// steps and then bisection: the time grows with the logarithm of the distance to the answer.
 std::size_t first_not_before(const Leaves& leaves, std::size_t begin, std::size_t end, const Lower& lower) {
   std::size_t step = 1;
   while (begin + step < end && leaves[begin + step].lower < lower) {
@@ -81,26 +67,14 @@ void turn(SignLeaf& leaf) {
   for (std::uint64_t& word : leaf.beyond) word = ~word;
 }
 
-/// Number of crossed edges of a leaf: the sum of the set bits of 24 words, counted by byte: 8 a word make 192
-/// at most.
 std::uint32_t count_crossings(const SignLeaf& leaf) {
-  std::uint64_t bytes = 0;
-  for (const BlockMask& axis : crossing_edges(leaf))
-    for (std::uint64_t word : axis) {
-      // Bits are added in pairs, fours and bytes, side by side; bytes are not added across until all words
-      // are in.
-      word -= (word >> 1) & 0x5555555555555555u;
-      word = (word & 0x3333333333333333u) + ((word >> 2) & 0x3333333333333333u);
-      bytes += (word + (word >> 4)) & 0x0f0f0f0f0f0f0f0fu;
-    }
-  constexpr std::uint64_t kEvenBytes = 0x00ff00ff00ff00ffu;
-  const std::uint64_t pairs = (bytes & kEvenBytes) + ((bytes >> 8) & kEvenBytes);
-  // The four sums of 16 bits, 384 at most, are added in the highest one.
-  return static_cast<std::uint32_t>((pairs * 0x0001000100010001u) >> 48);
+  int sum = 0;
+  for (const BlockMask& axis : crossing_edges(leaf)) sum += count(axis);
+  return static_cast<std::uint32_t>(sum);
 }
 
-/// Count – scan – fill over chunks of whole columns. The first pass merges the two sequences of leaves into
-/// runs that come from one operand or from both, and counts; the second writes.
+/// Count, scan, fill over chunks of whole columns. The first pass merges the two sequences of leaves into
+/// runs from one operand or both, and counts; the second writes.
 template <class Code>
 class Combination {
  public:
@@ -114,11 +88,12 @@ class Combination {
     result.placement = a_.placement;
     result.normal_code = a_.normal_code;
     result.outermost_inside = (rule_.inside(a_.outermost_inside, b_.outermost_inside) & 1) != 0;
-    // Count: chunks are merged side by side. A chunk is whole columns, since what a missing leaf means is
-    // told by the leaf before it in its column and by no other.
+    // Count. A chunk is whole columns, since the sign of a missing leaf depends on the previous leaf in its
+    // column.
     std::vector<Chunk> chunks = chunks_of_columns();
-    parallel_tasks(chunks.size(), context, [&](std::size_t i) { merge(chunks[i]); });
-    // Scan: chunks are in order, so the sums of those before a chunk say where its part of the result begins.
+    parallel_blocks(
+        chunks.size(), context, [&](std::size_t i) { merge(chunks[i]); }, 1);
+    // Scan: the sums of the previous chunks are the chunk's position in the result.
     std::size_t leaves = 0, crossings = 0;
     for (Chunk& chunk : chunks) {
       leaves += std::exchange(chunk.leaves, leaves);
@@ -127,16 +102,17 @@ class Combination {
     if (crossings > std::numeric_limits<std::uint32_t>::max())
       throw Error("the combined Hermite data would have " + std::to_string(crossings) +
                   " crossings, more than 32 bits can number; use larger voxels");
-    // Fill: each chunk writes to places of its own, whatever thread does it.
+    // Fill.
     result.leaves.resize(leaves);
     result.crossings.resize(crossings);
-    parallel_tasks(chunks.size(), context, [&](std::size_t i) { fill(chunks[i], result); });
+    parallel_blocks(
+        chunks.size(), context, [&](std::size_t i) { fill(chunks[i], result); }, 1);
     return result;
   }
 
  private:
   enum class From { a, b, both };
-  /// Leaves that follow one another: in `a` from leaf number `a`, in `b` from number `b`, or in both.
+  /// Consecutive leaves: in `a` from leaf number `a`, in `b` from number `b`, or in both.
   struct Run {
     From from;
     std::size_t a, b, count;
@@ -145,23 +121,23 @@ class Combination {
     std::size_t a_begin, a_end, b_begin, b_end;
     std::vector<Run> runs;
     std::size_t leaves = 0,
-                crossings = 0;  ///< sizes of its part of the result, then sums of the chunks before
+                crossings = 0;  ///< sizes of its part of the result, then sums of the previous chunks
   };
 
-  /// Chunks of both operands, cut at the columns of every 512th leaf of either operand.
+  /// Divides both operands at the columns of every 512th leaf of either operand.
   std::vector<Chunk> chunks_of_columns() const {
     std::vector<Lower> cuts;
     for (const Leaves* leaves : {&a_.leaves, &b_.leaves})
       for (std::size_t i = 0; i < leaves->size(); i += kLeavesPerChunk) {
         const Lower& lower = (*leaves)[i].lower;
-        // The least z, so that the cut is the beginning of the column.
+        // The least z is the beginning of the column.
         cuts.push_back({lower[0], lower[1], std::numeric_limits<std::int32_t>::min()});
       }
     std::sort(cuts.begin(), cuts.end());
     cuts.erase(std::unique(cuts.begin(), cuts.end()), cuts.end());
     std::vector<Chunk> chunks(cuts.size());
-    // From the back, where the end of a chunk is the beginning of the next one. The first cut is at the first
-    // leaf of either operand, so no leaf is left out.
+    // From the back, where the end of a chunk is the beginning of the next one. The first division is at the
+    // first leaf of either operand.
     std::size_t a_end = a_.leaves.size(), b_end = b_.leaves.size();
     for (std::size_t i = cuts.size(); i-- > 0;) {
       chunks[i].a_end = a_end, chunks[i].b_end = b_end;
@@ -175,8 +151,8 @@ class Combination {
     std::size_t i = chunk.a_begin, j = chunk.b_begin;
     while (i < chunk.a_end || j < chunk.b_end) {
       const bool a_ends = i == chunk.a_end, b_ends = j == chunk.b_end;
-      // Leaves at one place are combined sample by sample; a run of leaves of one operand, up to the next
-      // leaf of the other, is kept or dropped as a whole.
+      // Leaves at the same position are combined sample by sample; a run of leaves of one operand, up to the
+      // next leaf of the other, is preserved or dropped as a whole.
       if (!a_ends && !b_ends && a_.leaves[i].lower == b_.leaves[j].lower) {
         add_both(chunk, i++, j++);
       } else if (b_ends || (!a_ends && a_.leaves[i].lower < b_.leaves[j].lower)) {
@@ -195,22 +171,20 @@ class Combination {
     }
   }
 
-  /// Leaves `begin` to `end` of one operand, where the other has none. In the column of the other's last leaf
-  /// before them it has the sign that this leaf leaves behind, and further on that of infinity.
+  /// Adds leaves `begin` to `end` of one operand, where the other has none. In the column of the other's
+  /// previous leaf it has the sign beyond this leaf, and further on that of infinity.
   void add_from_one(Chunk& chunk, From from, const Hermite& own, std::size_t begin, std::size_t end,
                     const SignLeaf* last_of_other, bool outermost) const {
     std::size_t end_of_column = begin;
     if (last_of_other && same_column(*last_of_other, own.leaves[begin])) {
       const Lower& lower = own.leaves[begin].lower;
-      // No leaf starts at the greatest integer, which is no multiple of 8.
+      // The greatest integer is no multiple of 8, so no leaf starts there.
       end_of_column = first_not_before(own.leaves, begin, end,
                                        {lower[0], lower[1], std::numeric_limits<std::int32_t>::max()});
-      // Behind its last leaf in the column all samples of the other operand have one sign, the same over the
-      // whole layer.
+      // Beyond its last leaf in the column the sign is the same over the whole layer.
       const bool sign = (last_of_other->beyond[2] & 1) != 0;
       if (keeps(from, sign)) add_run(chunk, from, own, begin, end_of_column);
     }
-    // In later columns the other operand has no leaf before these, so there its sign is that of infinity.
     if (end_of_column < end && keeps(from, outermost)) add_run(chunk, from, own, end_of_column, end);
   }
 
@@ -221,13 +195,13 @@ class Combination {
   void add_run(Chunk& chunk, From from, const Hermite& own, std::size_t begin, std::size_t end) const {
     append(chunk, {from, begin, begin, end - begin});
     chunk.leaves += end - begin;
-    // Counted by subtraction; no leaf of the run is looked at.
+    // By subtraction, without reading the run's leaves.
     chunk.crossings += first_crossing(own, end) - first_crossing(own, begin);
   }
 
   void add_both(Chunk& chunk, std::size_t i, std::size_t j) const {
     const std::uint32_t crossings = count_crossings(combined_signs(rule_, a_.leaves[i], b_.leaves[j]));
-    // A leaf without a crossing edge has no place in the result, or equal data could differ.
+    // Leaves without a crossing edge are omitted, or equal data could differ.
     if (crossings == 0) return;
     append(chunk, {From::both, i, j, 1});
     chunk.leaves += 1;
@@ -237,7 +211,7 @@ class Combination {
   static void append(Chunk& chunk, const Run& run) {
     if (!chunk.runs.empty()) {
       Run& last = chunk.runs.back();
-      // A run that goes on where the last one ended becomes part of it, so that fill() copies in one piece.
+      // A run that continues the previous one becomes part of it, so that fill() copies in one piece.
       if (last.from == run.from && last.a + last.count == run.a && last.b + last.count == run.b) {
         last.count += run.count;
         return;
@@ -265,10 +239,9 @@ class Combination {
   static std::size_t write_one(const Hermite& from, std::size_t begin, std::size_t count, bool turned,
                                SignLeaf* leaf, Crossing* crossings, std::size_t first) {
     const std::size_t source = first_crossing(from, begin), end = first_crossing(from, begin + count);
-    // Unless it is turned about, the run is copied as it is; the numbers of first crossings move by one
-    // constant.
+    // Unless it is complemented, the run is copied; the numbers of first crossings change by a constant.
     std::memcpy(leaf, from.leaves.data() + begin, count * sizeof(SignLeaf));
-    // Modulo 2³²: the sum is right whichever of the two is greater.
+    // Modulo 2³², so correct also if `source` is greater.
     const auto shift = static_cast<std::uint32_t>(first - source);
     for (std::size_t i = 0; i < count; ++i) {
       leaf[i].first += shift;
@@ -301,18 +274,18 @@ class Combination {
     const Crossing *a, *b;
   };
 
-  /// Writes the crossings of the 64 edges of one word: crossed by `a`, by `b`, in the result; and the
-  /// result's signs at their first samples.
+  /// Writes the crossings of the 64 edges of one word, given those crossed by `a`, by `b`, and in the result,
+  /// and the result's signs at their first samples.
   Crossing* write_edges(Sources& from, std::uint64_t a, std::uint64_t b, std::uint64_t kept,
                         std::uint64_t inside, Crossing* to) const {
-    // No edge of the word is in the result: the crossings of both operands are passed over by their number.
+    // No edge of the word is in the result: skip the crossings of both operands.
     if (kept == 0) {
       from.a += std::popcount(a);
       from.b += std::popcount(b);
       return to;
     }
     for (std::uint64_t left = a | b; left != 0; left &= left - 1) {
-      // In order of the samples, so that both cursors move along with the bits and no rank is computed.
+      // In order of the samples, so that both cursors advance with the bits and no rank is computed.
       const std::uint64_t bit = left & (~left + 1);
       const bool in_a = (a & bit) != 0, in_b = (b & bit) != 0;
       if (kept & bit) *to++ = taken(from, in_a, in_b, (inside & bit) != 0);
@@ -322,10 +295,10 @@ class Combination {
     return to;
   }
 
-  /// The crossing that the result takes. Which operands cross an edge is as good as random, so nothing is
-  /// branched on but equal offsets.
+  /// Returns the crossing of the result. The crossing operands are unpredictable, so the only branch is on
+  /// equal offsets.
   Crossing taken(const Sources& from, bool in_a, bool in_b, bool first_inside) const {
-    // If one operand crosses the edge, its crossing stands for the other's, which is not looked at.
+    // If one operand crosses the edge, its crossing replaces the other's, which is not read.
     const Crossing* const of_a = in_a ? from.a : from.b;
     const Crossing* const of_b = in_b ? from.b : from.a;
     const bool both = in_a & in_b;
@@ -377,10 +350,11 @@ SparseHermite<Crossing> complement(SparseHermite<Crossing> hermite, RunContext& 
   with_crossing_code(hermite, [&](auto code) {
     using Code = decltype(code);
     const auto in_chunks = [&](auto& array, std::size_t size, auto&& change) {
-      parallel_tasks((array.size() + size - 1) / size, context, [&](std::size_t chunk) {
+      const auto change_chunk = [&](std::size_t chunk) {
         const std::size_t end = std::min(array.size(), (chunk + 1) * size);
         for (std::size_t i = chunk * size; i < end; ++i) change(array[i]);
-      });
+      };
+      parallel_blocks((array.size() + size - 1) / size, context, change_chunk, 1);
     };
     in_chunks(hermite.leaves, kLeavesPerChunk, turn);
     in_chunks(hermite.crossings, kCrossingsPerChunk,

@@ -8,20 +8,21 @@
 
 namespace hermesh {
 
-/// The union, the intersection or the difference `a` \ `b`, by the rule of boolean_rule.h, which says what is
-/// lost and what laws hold. Leaves without a crossing edge are left out, so the laws hold member by member;
-/// placement and normal code are those of `a`. Time goes with the leaves of both operands that are near each
-/// other: what one of them alone has is copied in long runs, or skipped, without a look at its samples. The
-/// bytes are the same for every number of threads.
+/// Computes the union, the intersection or the difference `a` \ `b`, by the rule of boolean_rule.h, which
+/// lists losses and laws. Leaves without a crossing edge are omitted, so the laws hold member by member;
+/// placement and normal code are those of `a`. The time grows with the number of leaves of both operands that
+/// are near each other: leaves that only one operand has are copied or skipped in long runs. The bytes are
+/// the same for every number of threads.
 /// @throws Error if the operands are on different lattices, have normals in different codes, or the result
-/// would have 2³² crossings or more. @throws Cancelled.
+/// would have 2³² crossings or more; Cancelled.
 template <class Crossing>
 SparseHermite<Crossing> combine(Boolean boolean, const SparseHermite<Crossing>& a,
                                 const SparseHermite<Crossing>& b, RunContext& context);
 
-/// The complement: what is outside becomes inside, at infinity, too; normals are turned about, offsets and
-/// tags stay. Works in place if its argument is moved into it. An involution, bit by bit, for normals that
-/// the pack() of a NormalCode returned. @throws Cancelled.
+/// Computes the complement: the outside becomes inside, also at infinity; normals are reversed, offsets and
+/// tags unchanged. Works in place if its argument is moved into it. An involution, bit by bit, for normals
+/// that the pack() of a NormalCode returned.
+/// @throws Cancelled.
 template <class Crossing>
 SparseHermite<Crossing> complement(SparseHermite<Crossing> hermite, RunContext& context);
 

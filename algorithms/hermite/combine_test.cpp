@@ -6,11 +6,11 @@
 #include <optional>
 #include <random>
 
+#include "algorithms/hermite/normal_codes.h"
 #include "algorithms/hermite/test_lattice.h"
-#include "algorithms/hermite/with_normal_code.h"
 
 namespace hermesh {
-namespace {
+namespace combine_test {
 
 constexpr std::array kBooleans = {Boolean::unite, Boolean::intersect, Boolean::subtract};
 
@@ -301,7 +301,7 @@ TYPED_TEST(Combine, BoxesThatTouchJoinWithoutASeam) {
 }
 
 TYPED_TEST(Combine, PiecesOfACutShareItsCrossings) {
-  // What a fracture needs: both sides of the cut have the cutter's crossings, with opposite normals.
+  // A fracture requires that both sides of the cut have the cutter's crossings, with opposite normals.
   const auto whole = sampled<TypeParam>(ball(12, 12, 12, 10.2)),
              cutter = sampled<TypeParam>(box(20, 12, 12, 7.3, 13, 13));
   const auto within = to_lattice(this->intersect(whole, cutter), -8, 40);
@@ -410,5 +410,5 @@ TEST(CombineByHand, RefusesWhatDoesNotFitTogether) {
   EXPECT_THROW(combine(Boolean::unite, a, a, context), Cancelled);
 }
 
-}  // namespace
+}  // namespace combine_test
 }  // namespace hermesh

@@ -10,7 +10,7 @@ namespace {
 
 using Lower = std::array<std::int32_t, 3>;
 
-/// A leaf that may own crossings, and the crossings that it turned out to own.
+/// A leaf that may own crossings, and its crossings.
 struct Candidate {
   SignLeaf leaf{};
   std::vector<EdgeCrossing> crossings;
@@ -21,15 +21,15 @@ class FunctionSampler {
   FunctionSampler(const AnalyticSurface& surface, const IndexToWorld& placement, const Lower& lower,
                   const Lower& upper, double tolerance)
       : surface_(surface), placement_(placement), lower_(lower), upper_(upper), tolerance_(tolerance) {
-    // The farthest sample that a leaf looks at lies 4 voxels from its center along each axis, 4.5 to be sure.
-    // If the value at the center is larger than such a way times the slope, none of these samples can have
+    // The farthest sample of a leaf's edges lies 4 voxels from its center along each axis, 4.5 with a margin.
+    // If the value at the center is larger than this distance times the slope, none of these samples can have
     // the other sign.
     reach_ = surface.lipschitz * 4.5 * placement.linear.colwise().norm().sum();
   }
 
   bool may_cross(const Lower& leaf) const {
     const Eigen::Vector3d centre = world(leaf, Eigen::Vector3d::Constant(4.0));
-    // Negated, so that a value that is no number lets the leaf be sampled, where it is reported.
+    // Negated, so that a leaf with NaN is sampled, where it is reported.
     return !(std::abs(surface_.value(centre)) > reach_);
   }
 
@@ -38,8 +38,8 @@ class FunctionSampler {
     for (int x = 0; x < 9; ++x)
       for (int y = 0; y < 9; ++y)
         for (int z = 0; z < 9; ++z) {
-          // Of the samples beyond the leaf only those of the three layers next to it, without the edges where
-          // layers meet: no edge of the leaf ends there.
+          // Samples beyond the leaf only of the three adjacent layers, without the edges where layers meet:
+          // no edge of the leaf ends there.
           const int beyond = (x == 8) + (y == 8) + (z == 8);
           if (beyond > 1 || !is_inside({leaf.lower[0] + x, leaf.lower[1] + y, leaf.lower[2] + z})) continue;
           if (x == 8)
@@ -58,7 +58,7 @@ class FunctionSampler {
 
  private:
   Eigen::Vector3d world(const Lower& index, const Eigen::Vector3d& step) const {
-    // Differences of whole numbers come first, which are exact, so that a far lattice costs no precision.
+    // Differences of integers first, which are exact, so that a far lattice costs no precision.
     Eigen::Vector3d local = step;
     for (int a = 0; a < 3; ++a) local[a] += double(index[a]) - double(placement_.base[a]);
     return placement_.local(local) + placement_.origin;
@@ -67,7 +67,6 @@ class FunctionSampler {
   bool is_inside(const Lower& index) const {
     bool border = false;
     for (int a = 0; a < 3; ++a) {
-      // Samples beyond the box are outside, whatever the function says there.
       if (index[a] < lower_[a] || index[a] > upper_[a]) return false;
       border = border || index[a] == lower_[a] || index[a] == upper_[a];
     }
@@ -83,13 +82,13 @@ class FunctionSampler {
     const Lower start{leaf.lower[0] + (i >> 6), leaf.lower[1] + ((i >> 3) & 7), leaf.lower[2] + (i & 7)};
     const auto at = [&](double offset) { return world(start, offset * Eigen::Vector3d::Unit(axis)); };
     const auto value = [&](double offset) { return surface_.value(at(offset)); };
-    // TOMS 748 (Alefeld, Potra & Shi 1995) keeps a bracket: the ends of the edge have different signs, so it
-    // converges whatever the function is like. 200 steps are more than halving alone would need.
+    // TOMS 748 (Alefeld, Potra & Shi 1995) brackets the root: the ends of the edge have different signs, so
+    // it converges for any function. 200 steps are more than bisection alone would need.
     std::uintmax_t steps = 200;
     const auto close = [&](double a, double b) { return b - a <= tolerance_; };
     const auto [a, b] = boost::math::tools::toms748_solve(value, 0.0, 1.0, close, steps);
     const double offset = 0.5 * (a + b);
-    // A gradient in index space: the transposed map turns covectors of the world into those of the grid.
+    // In index space: the transposed map converts covectors of the world to those of the grid.
     Eigen::Vector3d normal = placement_.linear.transpose() * surface_.gradient(at(offset));
     if (!(normal.norm() > 0)) normal = (test(leaf.inside, i) ? 1.0 : -1.0) * Eigen::Vector3d::Unit(axis);
     normal.normalize();
@@ -104,18 +103,8 @@ class FunctionSampler {
   double reach_ = 0.0;
 };
 
-/// The first layer of a leaf's samples along an axis, a bit each in any order.
-std::uint64_t first_layer(const BlockMask& inside, int axis) {
-  if (axis == 0) return inside[0];
-  std::uint64_t bits = 0;
-  for (std::size_t x = 0; x < 8; ++x)
-    for (int i = 0; i < 8; ++i)
-      bits |= (inside[x] >> (axis == 1 ? i : 8 * i) & 1) << (8 * x + std::size_t(i));
-  return bits;
-}
-
-/// Refuses data of which a leaf is missing that owns a crossing edge: a block was passed over whose function
-/// is steeper than was said. Whoever read such data would look for crossings that are not there.
+/// @throws Error if a leaf is missing that owns a crossing edge: a skipped block whose function is steeper
+/// than its bound.
 void check_complete(const FloatHermite& hermite) {
   for (const SignLeaf& leaf : hermite.leaves)
     for (int axis = 0; axis < 3; ++axis)
@@ -127,8 +116,7 @@ void check_complete(const FloatHermite& hermite) {
         if (seen != (hermite.sign_without_leaf(next) ? ~std::uint64_t{0} : 0))
           throw Error(
               "the function changes its sign in a block that it seems far from: it is steeper than the bound "
-              "of its "
-              "slope says");
+              "of its slope says");
       }
 }
 
@@ -148,8 +136,7 @@ FloatHermite sample_function(const AnalyticSurface& surface, const IndexToWorld&
     leaves[a] = (((upper[a] & ~7) - first[a]) >> 3) + 1;
   }
   const FunctionSampler sampler(surface, placement, lower, upper, tolerance);
-  // A layer of leaves of one x for each task. Candidates come in ascending order within a layer, and layers
-  // are joined in order, whatever thread made them.
+  // A task is a layer of leaves of one x. Candidates ascend within a layer, and layers are joined in order.
   std::vector<std::vector<Candidate>> layers(static_cast<std::size_t>(leaves[0]));
   parallel_blocks(layers.size(), context, [&](std::size_t x) {
     for (std::int32_t y = 0; y < leaves[1]; ++y)
@@ -165,7 +152,6 @@ FloatHermite sample_function(const AnalyticSurface& surface, const IndexToWorld&
   });
   FloatHermite result;
   result.placement = placement;
-  // The sum is checked to be an index before the records are copied.
   std::vector<std::uint64_t> counts;
   for (const auto& layer : layers)
     for (const Candidate& candidate : layer) counts.push_back(candidate.crossings.size());

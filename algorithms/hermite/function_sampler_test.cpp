@@ -7,7 +7,7 @@
 #include "algorithms/hermite/test_normals.h"
 
 namespace hermesh {
-namespace {
+namespace function_sampler_test {
 
 using Eigen::Vector3d;
 
@@ -97,8 +97,8 @@ TEST(FunctionSampler, RefusesWhatItCannotClose) {
   const AnalyticSurface nowhere{[](const Vector3d&) { return std::nan(""); },
                                 [](const Vector3d& p) { return p; }};
   EXPECT_THROW(sample(nowhere, 9, 1e-6), Error);
-  // Steeper than it says: blocks that the surface passes through would be passed over, and the data would be
-  // in pieces.
+  // Steeper than its declared Lipschitz constant: blocks that the surface passes through would be skipped,
+  // and the data would be disconnected.
   AnalyticSurface steep = sphere(Vector3d::Zero(), 30.0);
   steep.value = [](const Vector3d& p) { return 4.0 * (p.norm() - 30.0); };
   EXPECT_THROW(sample(steep, 40, 1e-6), Error);
@@ -121,5 +121,5 @@ TEST(FunctionSampler, SameBytesAtAnyThreadCount) {
   }
 }
 
-}  // namespace
+}  // namespace function_sampler_test
 }  // namespace hermesh

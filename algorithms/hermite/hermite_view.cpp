@@ -9,55 +9,31 @@ namespace {
 
 using Lower = std::array<std::int32_t, 3>;
 
-/// Which blocks below a leaf hold a cell with one of its crossing edges: bit |dx| + 2|dy| + 4|dz| for each
-/// direction. The cells around an edge begin at its own sample and one step down each axis that is not the
-/// edge's.
-unsigned blocks_below(const std::array<BlockMask, 3>& edges) {
-  // Whether an edge along `axis` starts in the first layers along the axes whose bits are set in `down`.
-  const auto touches = [&](int axis, int down) {
-    const std::uint64_t bits = first_layers(down & 2, down & 4);
-    for (int x = 0; x < (down & 1 ? 1 : 8); ++x)
-      if (edges[axis][x] & bits) return true;
-    return false;
-  };
-  // Six directions: an edge moves down along two axes at most, so never along all three.
-  unsigned wanted = 0;
-  for (int down = 1; down < 7; ++down)
-    for (int axis = 0; axis < 3; ++axis)
-      if (!((down >> axis) & 1) && touches(axis, down)) wanted |= 1u << down;
-  return wanted;
-}
-
-Lower below(const SignLeaf& leaf, int down) {
-  return {leaf.lower[0] - 8 * (down & 1), leaf.lower[1] - 8 * ((down >> 1) & 1),
-          leaf.lower[2] - 8 * (down >> 2)};
-}
-
-/// Places in ascending order, each once, of the blocks that no leaf is at although one of its cells has a
-/// crossing edge.
+/// Returns the positions, in ascending order and each once, of the blocks without a leaf that have a cell
+/// with a crossing edge.
 std::vector<Lower> blocks_without_leaf(std::span<const SignLeaf> leaves, RunContext& context) {
   std::vector<std::uint8_t> missing(leaves.size());
   parallel_blocks(leaves.size(), context, [&](std::size_t i) {
-    // The crossing edges are found anew for the blocks: to keep them would take longer.
+    // Computing the crossing edges again for the blocks is faster than storing them.
     const unsigned wanted = blocks_below(crossing_edges(leaves[i]));
     for (int down = 1; down < 7; ++down)
-      // A block below comes before this one, so only the leaves before it are searched.
+      // A lower block precedes this one, so only the leaves before it are searched.
       if (wanted >> down & 1 &&
-          !std::ranges::binary_search(leaves.first(i), below(leaves[i], down), {}, &SignLeaf::lower))
+          !std::ranges::binary_search(leaves.first(i), block_below(leaves[i].lower, down), {},
+                                      &SignLeaf::lower))
         missing[i] = static_cast<std::uint8_t>(missing[i] | 1u << down);
   });
-  // Several leaves may want the same block; sorted, its doubles lie side by side.
   std::vector<Lower> found;
   for (std::size_t i = 0; i < leaves.size(); ++i)
     for (int down = 1; down < 7; ++down)
-      if (missing[i] >> down & 1) found.push_back(below(leaves[i], down));
+      if (missing[i] >> down & 1) found.push_back(block_below(leaves[i].lower, down));
   std::ranges::sort(found);
   found.erase(std::unique(found.begin(), found.end()), found.end());
   return found;
 }
 
-/// The sign of an added block, which has no leaf and owns no crossing edge. All of its samples have one sign,
-/// and so have the blocks that are not there, up to the nearest owner above: no edge on the way is crossed.
+/// Returns the sign of an added block, which has no leaf and owns no crossing edge. All of its samples have
+/// one sign, as have the missing blocks up to the nearest owner above: no edge between them is crossed.
 bool sign_of_added(const HermiteView::Blocks& blocks, const HermiteView::Block& block) {
   for (int d = 1; d < 8; ++d) {
     const std::int32_t there = block.neighbours[neighbour_slot(d & 1, (d >> 1) & 1, d >> 2)];
@@ -66,7 +42,7 @@ bool sign_of_added(const HermiteView::Blocks& blocks, const HermiteView::Block& 
   return false;
 }
 
-/// Blocks of one x and y, which follow one another.
+/// Blocks of one x and y, which are consecutive.
 struct Column {
   std::array<std::int32_t, 2> lower;
   std::size_t first;
@@ -74,9 +50,28 @@ struct Column {
 
 }  // namespace
 
+unsigned blocks_below(const std::array<BlockMask, 3>& edges) {
+  // Returns true if an edge along `axis` starts in the first layers along the axes whose bits are set in
+  // `down`.
+  const auto touches = [&](int axis, int down) {
+    const std::uint64_t bits = first_layers(down & 2, down & 4);
+    for (int x = 0; x < (down & 1 ? 1 : 8); ++x)
+      if (edges[axis][x] & bits) return true;
+    return false;
+  };
+  unsigned wanted = 0;
+  for (int down = 1; down < 7; ++down)
+    for (int axis = 0; axis < 3; ++axis)
+      if (!((down >> axis) & 1) && touches(axis, down)) wanted |= 1u << down;
+  return wanted;
+}
+
+std::array<std::int32_t, 3> block_below(const std::array<std::int32_t, 3>& lower, int down) {
+  return {lower[0] - 8 * (down & 1), lower[1] - 8 * ((down >> 1) & 1), lower[2] - 8 * (down >> 2)};
+}
+
 void find_neighbours(HermiteView::Blocks& blocks, RunContext& context) {
-  // Column by column: each block's three neighbours in an adjacent one lie behind those of the block before
-  // it.
+  // Column by column: each block's three neighbours in an adjacent one follow those of the previous block.
   std::vector<Column> columns;
   for (std::size_t i = 0; i < blocks.size(); ++i) {
     const std::array<std::int32_t, 2> lower{blocks[i].lower[0], blocks[i].lower[1]};
@@ -95,8 +90,7 @@ void find_neighbours(HermiteView::Blocks& blocks, RunContext& context) {
       const std::size_t end = found ? (there + 1)->first : 0;
       for (std::size_t i = columns[c].first; i < columns[c + 1].first; ++i) {
         const std::int32_t z = blocks[i].lower[2];
-        // Both columns ascend, so one sweep over them finds all neighbors, in time that grows with their
-        // lengths.
+        // Both columns ascend, so one sweep over them finds all neighbors in linear time.
         while (next < end && blocks[next].lower[2] < z - 8) ++next;
         for (std::size_t slot = 0, at = next; slot < 3; ++slot) {
           const bool hit = at < end && blocks[at].lower[2] == z + 8 * (static_cast<int>(slot) - 1);
@@ -118,7 +112,7 @@ HermiteView::HermiteView(std::span<const SignLeaf> leaves, const IndexToWorld& p
   }
   blocks_.resize(leaves.size() + added.size());
   parallel_blocks(leaves.size(), context, [&](std::size_t i) {
-    // Leaves and added blocks are merged in order: an added block stands before the leaf that follows it.
+    // Leaves and added blocks are merged in order.
     const auto added_before = std::ranges::upper_bound(leaves_before, i) - leaves_before.begin();
     Block& block = blocks_[i + static_cast<std::size_t>(added_before)];
     block.lower = leaves[i].lower;
@@ -134,8 +128,7 @@ HermiteView::HermiteView(std::span<const SignLeaf> leaves, const IndexToWorld& p
     block.leaf = -1;
   }
   find_neighbours(blocks_, context);
-  // Signs of added blocks are read off neighbours, so these must be known. Only signs of leaves are read,
-  // which no thread writes.
+  // Only signs of leaves are read here, which no thread writes.
   parallel_blocks(added.size(), context, [&](std::size_t i) {
     Block& block = blocks_[leaves_before[i] + i];
     if (sign_of_added(blocks_, block)) block.inside = kAllInside;

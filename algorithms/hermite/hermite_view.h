@@ -1,5 +1,5 @@
-// Hermite data of any representation as extraction walks over it: blocks with their neighbours, and a
-// crossing for each crossing edge.
+// Hermite data of any representation as extraction reads them: blocks with their neighbours, and a crossing
+// for each crossing edge.
 #pragma once
 
 #include <algorithm>
@@ -15,15 +15,15 @@
 
 namespace hermesh {
 
-/// Hermite data as blocks: there is one for every cell with a crossing edge and for every owner of one. The
-/// view refers to the data that it was made of, which must outlive it.
+/// Hermite data as blocks: one for every cell with a crossing edge and for every owner of one. The view
+/// refers to its data, which must outlive it.
 class HermiteView {
  public:
   struct Block : CrossingEdges {
     std::array<std::int32_t, 3> lower;  ///< index coordinates of the first sample
     std::int32_t leaf;                  ///< number among the leaves that own crossings; −1 for none
-    BlockMask inside;                   ///< also where there is no leaf: then all samples are of one sign
-    /// Numbers of the blocks around, by neighbour_slot(); −1 where there is none.
+    BlockMask inside;                   ///< valid also without a leaf: then all samples are of one sign
+    /// Numbers of the blocks around, by neighbour_slot(); −1 for none.
     std::array<std::int32_t, 27> neighbours;
   };
 
@@ -33,14 +33,14 @@ class HermiteView {
   const Blocks& blocks() const { return blocks_; }
   const IndexToWorld& placement() const { return placement_; }
 
-  /// The crossing of an edge, which must be crossed.
+  /// Returns the crossing of an edge, which must be crossed.
   virtual EdgeCrossing crossing(std::int32_t block, int sample, int axis) const = 0;
-  /// All crossings of a block, in the order of CrossingEdges::rank(). `out` has room for as many, 1536 at
-  /// most.
+  /// Writes all crossings of a block, in the order of CrossingEdges::rank(), to `out`, which has room for at
+  /// most 1536.
   virtual void crossings(std::int32_t block, EdgeCrossing* out) const = 0;
 
  protected:
-  /// Makes the blocks of `leaves`, which come in ascending order and all own a crossing edge. @throws
+  /// Makes the blocks of `leaves`, which are in ascending order and all own a crossing edge. @throws
   /// Cancelled.
   HermiteView(std::span<const SignLeaf> leaves, const IndexToWorld& placement, RunContext& context);
 
@@ -49,22 +49,29 @@ class HermiteView {
   Blocks blocks_;
 };
 
+/// Returns the directions of the lower blocks that hold a cell with one of a leaf's edges, given by axis and
+/// first sample: bit `down` = |dx| + 2|dy| + 4|dz|. The cells around an edge begin at its own sample and one
+/// step down each axis that is not the edge's, so at most two axes are involved.
+unsigned blocks_below(const std::array<BlockMask, 3>& edges);
+/// Returns the first sample of the block in such a direction.
+std::array<std::int32_t, 3> block_below(const std::array<std::int32_t, 3>& lower, int down);
+
 /// Sets `neighbours` of blocks in ascending order of (x, y, z).
 void find_neighbours(HermiteView::Blocks& blocks, RunContext& context);
 
-/// The cells of a block that have an edge of a mask, by their first corners. `edges(block)` gives the masks
-/// of a block that is there, by axis.
+/// Returns the cells of a block that have an edge of a mask, by their first corners. `edges(block)` returns
+/// the masks of an existing block, by axis.
 template <class Edges>
 BlockMask cells_with_edges(const HermiteView::Blocks& blocks, std::size_t block, Edges&& edges);
-/// The cells of a block with a crossing edge, by their first corners.
+/// Returns the cells of a block with a crossing edge, by their first corners.
 BlockMask cells_with_crossings(const HermiteView::Blocks& blocks, std::size_t block);
 
-/// The four cells around an edge as steps along the two axes after its own, counter-clockwise for a viewer
-/// whom the edge's axis points at.
+/// The four cells around an edge as steps along the two axes after its own, counter-clockwise if the edge's
+/// axis points at the viewer.
 inline constexpr int kAroundEdge[4][2] = {{-1, -1}, {0, -1}, {0, 0}, {-1, 0}};
 
-/// The cells around the edges along one axis that start in a block. The neighbouring blocks are looked up
-/// once, in the constructor, for all of these edges.
+/// The cells around the edges along one axis that start in a block, whose neighbours are looked up once in
+/// the constructor.
 class CellsAroundEdges {
  public:
   CellsAroundEdges(const HermiteView::Blocks& blocks, std::size_t block, int axis)
@@ -79,8 +86,8 @@ class CellsAroundEdges {
     }
   }
 
-  /// The cells around the edge that starts at a sample, in the order of kAroundEdge. Around a crossing edge
-  /// there is a block for each.
+  /// Returns the cells around the edge that starts at a sample, in the order of kAroundEdge. Around a
+  /// crossing edge each has a block.
   std::array<LatticePlace, 4> operator()(int sample) const {
     // A cell below in u or v is in the neighbour where the sample's own coordinate is 0.
     const int low_u = (sample & (7 * u_)) == 0, low_v = (sample & (7 * v_)) == 0 ? 2 : 0;
@@ -103,8 +110,8 @@ BlockMask cells_with_edges(const HermiteView::Blocks& blocks, std::size_t block,
   BlockMask result{};
   for (int axis = 0; axis < 3; ++axis)
     for (const auto& [u, v] : kAroundEdge) {
-      // The four edges of a cell along an axis start at its corners of the face across that axis: masks of
-      // edges, shifted back to the cell's first corner.
+      // The four edges of a cell along an axis start at its corners of the face across that axis: shifted
+      // masks of edges.
       int d[3] = {0, 0, 0};
       d[(axis + 1) % 3] = -u;
       d[(axis + 2) % 3] = -v;
@@ -118,12 +125,11 @@ BlockMask cells_with_edges(const HermiteView::Blocks& blocks, std::size_t block,
   return result;
 }
 
-/// Dual contouring's loop over the edges of a block, whatever is made of them: a quad, or a polygon between
-/// regions of cells. Calls f(axis, sample, cells) for each crossing edge, in the order of
-/// CrossingEdges::rank(); `cells` are the four around it, in the order of kAroundEdge.
+/// Dual contouring's loop over the edges of a block. Calls f(axis, sample, cells) for each crossing edge, in
+/// the order of CrossingEdges::rank(); `cells` are the four around it, in the order of kAroundEdge.
 template <class F>
 void for_each_edge_with_cells(const HermiteView::Blocks& blocks, std::size_t block, F&& f) {
-  if (blocks[block].crossing_count() == 0) return;  // most blocks that exist for their cells alone
+  if (blocks[block].crossing_count() == 0) return;  // most blocks that exist only for their cells
   const CellsAroundEdges around[3] = {{blocks, block, 0}, {blocks, block, 1}, {blocks, block, 2}};
   blocks[block].for_each([&](int axis, int sample) { f(axis, sample, around[axis](sample)); });
 }

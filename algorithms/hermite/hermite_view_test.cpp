@@ -11,7 +11,7 @@
 #include "algorithms/lattice/active_cells.h"
 
 namespace hermesh {
-namespace {
+namespace hermite_view_test {
 
 using Index = std::array<int, 3>;
 
@@ -101,7 +101,7 @@ TEST_P(HermiteViewTest, CellsAroundAnEdgeGoRoundItCounterClockwise) {
         wanted[static_cast<std::size_t>((axis + 2) % 3)] += steps[i][1];
         ASSERT_GE(cells[i].block, 0);
         EXPECT_EQ(index_of(blocks[static_cast<std::size_t>(cells[i].block)], cells[i].sample), wanted);
-        // The same place by locate().
+        // locate() must find the same position.
         const LatticePlace same = locate(blocks[b].neighbours, wanted[0] - blocks[b].lower[0],
                                          wanted[1] - blocks[b].lower[1], wanted[2] - blocks[b].lower[2]);
         EXPECT_EQ(same.block, cells[i].block);
@@ -115,5 +115,5 @@ TEST_P(HermiteViewTest, CellsAroundAnEdgeGoRoundItCounterClockwise) {
 INSTANTIATE_TEST_SUITE_P(Noise, HermiteViewTest,
                          testing::Combine(testing::Values(1u, 2u, 3u), testing::Bool()));
 
-}  // namespace
+}  // namespace hermite_view_test
 }  // namespace hermesh

@@ -18,7 +18,7 @@
 #include "algorithms/lattice/simd/simd_level.h"
 
 namespace hermesh {
-namespace {
+namespace level_set_sampler_test {
 
 using Eigen::Vector3d;
 using openvdb::Coord;
@@ -112,8 +112,8 @@ TEST_F(LevelSetSamplerTest, AnIsovalueInsideTheBand) {
                   1.25, 5000);
 }
 
-/// The band goes on where the background, or what is beyond it, ends: six voxels inside of a surface and
-/// three outside, and all of a volume over a background of 0.
+/// The band extends beyond values of the magnitude of the background: to six voxels inside of a surface and
+/// three outside, and over all of a volume with a background of 0.
 TEST_F(LevelSetSamplerTest, TheBackgroundsMagnitudeIsNotTheBandsEverywhere) {
   const Vector3d centre(0.2, 0.1, 0.7);
   for (const auto& [background, isovalue] : {std::pair(3.0f, -4.0), std::pair(0.0f, 0.0)}) {
@@ -135,8 +135,8 @@ TEST_F(LevelSetSamplerTest, TheBackgroundsMagnitudeIsNotTheBandsEverywhere) {
   }
 }
 
-/// What is clamped inside is no data, though it is less in magnitude than the background: the normals of a
-/// plane stay exact. Without tiles inside, samples have to tell.
+/// Samples that are clamped inside are no data, although their magnitude is less than that of the background:
+/// the normals of a plane stay exact. Without tiles inside, the clamping is detected from the samples.
 TEST_F(LevelSetSamplerTest, ABandThatIsNarrowerInside) {
   constexpr float kOutside = 4.0f, kInside = 1.2f;
   constexpr int kSide = 32;
@@ -235,7 +235,7 @@ TEST_F(LevelSetSamplerTest, EmptyAndFullVolumes) {
   RunContext context;
   const auto empty = openvdb::FloatGrid::create(3.0f);
   EXPECT_TRUE(sample_level_set(make_level_set(empty), 0.0, context).leaves.empty());
-  // All inside but for nothing: no surface, and the outermost sign is told.
+  // All samples are inside: there is no surface, and the outermost sign is inside.
   const auto full = openvdb::FloatGrid::create(-3.0f);
   full->setGridClass(openvdb::GRID_LEVEL_SET);
   const FloatHermite hermite = sample_level_set(make_level_set(full), 0.0, context);
@@ -268,8 +268,8 @@ TEST_F(LevelSetSamplerTest, NoiseWithStencilsThatEndAnywhere) {
   expect_as_plain(noise_with_tiles(), 0.0, 40000);
 }
 
-/// Every edge is crossed, in more leaves in a row than the kernels take at once: what their lists have room
-/// for. Samples of the lowest layers are no data.
+/// Every edge is crossed, in more consecutive leaves than the kernels process at once, to test the capacity
+/// of their lists. Samples of the lowest layers are no data.
 openvdb::FloatGrid::Ptr checkerboard() {
   const auto grid = openvdb::FloatGrid::create(1.0f);
   grid->setGridClass(openvdb::GRID_LEVEL_SET);
@@ -324,7 +324,7 @@ TEST_F(LevelSetSamplerTest, SameBytesAtAnyLevelOfVectorCodeAndAnyThreadCount) {
   expect_same_bytes(openvdb::tools::createLevelSetSphere<openvdb::FloatGrid>(
       50.0f, openvdb::Vec3f(0.1f, 0.2f, 0.3f), 1.0f));
   expect_same_bytes(noise_with_tiles());
-  const auto fog = noise_with_tiles();  // no level set: what is not active is no data
+  const auto fog = noise_with_tiles();  // not a level set: inactive samples are no data
   fog->setGridClass(openvdb::GRID_FOG_VOLUME);
   expect_same_bytes(fog);
   expect_same_bytes(checkerboard());
@@ -372,5 +372,5 @@ TEST_F(LevelSetSamplerTest, ErrorsOfWhatRunsBesideTheSamplingAndCancellationArri
   }
 }
 
-}  // namespace
+}  // namespace level_set_sampler_test
 }  // namespace hermesh

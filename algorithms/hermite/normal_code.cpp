@@ -1,7 +1,7 @@
 #include "algorithms/hermite/normal_code.h"
 
 #include "algorithms/core/error.h"
-#include "algorithms/hermite/with_normal_code.h"
+#include "algorithms/hermite/normal_codes.h"
 
 namespace hermesh {
 

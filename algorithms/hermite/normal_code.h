@@ -1,7 +1,6 @@
 // Unit normals in 16 bits: the thesis's code (Aldén 2011, §4.1), the one that it was taken from, and better
 // ones of the same size. A code is a type with static functions, so that loops over normals have it as a
-// template parameter; with_normal_code() of with_normal_code.h, which has the codes themselves and is
-// included by few files, chooses it by name outside of the loop.
+// template parameter; with_normal_code() of normal_codes.h selects it by name outside of the loop.
 //
 //               mean / max error   codes in use
 //   thesis         1.32° / 2.58°         64,008   as printed
@@ -22,9 +21,9 @@
 namespace hermesh {
 
 /// pack() takes any vector, of unit length or not; one without a direction (NaN, infinite, shorter than
-/// 1e-30) gets the code 0, which is that of +z. It gives the same code on every machine. unpack() gives unit
-/// length for all 65,536 codes. For codes that pack() returns, negate() is an involution without a fixed
-/// point, it returns such codes only, and unpack(negate(c)) is exactly -unpack(c). That pack(-n) is
+/// 1e-30) gets the code 0, which is that of +z. It returns the same code on every machine. unpack() returns
+/// unit length for all 65,536 codes. For codes that pack() returns, negate() is an involution without a fixed
+/// point, it returns only such codes, and unpack(negate(c)) is exactly -unpack(c). That pack(-n) is
 /// negate(pack(n)) holds for all normals with `rounded` and `nearest`; with `octahedral` not for some of the
 /// plane z = 0, and with the two that floor not for those with a component that is exactly zero.
 template <class Code>
@@ -36,7 +35,7 @@ concept NormalCode = requires(const std::array<float, 3>& normal, std::uint16_t 
 };
 
 /// Orders codes so that negating both of a pair reverses their order: order(negate(c)) = -1 - order(c). Where
-/// two normals are otherwise equally good, choosing the lower one in a union and the higher one in an
+/// two normals are otherwise equally good, taking the lower one in a union and the higher one in an
 /// intersection then obeys De Morgan's laws.
 template <NormalCode Code>
 int order(std::uint16_t code) {
@@ -51,7 +50,7 @@ inline constexpr std::array kNormalCodes = {NormalCodeId::thesis, NormalCodeId::
 
 std::string_view name(NormalCodeId id);
 
-/// The code of a name. @throws Error that lists the names there are.
+/// Returns the code of a name. @throws Error that lists the valid names.
 NormalCodeId parse_normal_code(std::string_view text);
 
 }  // namespace hermesh

@@ -11,10 +11,10 @@
 #include <vector>
 
 #include "algorithms/core/error.h"
-#include "algorithms/hermite/with_normal_code.h"
+#include "algorithms/hermite/normal_codes.h"
 
 namespace hermesh {
-namespace {
+namespace normal_code_test {
 
 using Normal = std::array<float, 3>;
 
@@ -106,8 +106,8 @@ TYPED_TEST(NormalCodes, HaveANegationWithoutFixedPoints) {
   }
 }
 
-/// For the codes that floor, the code of -n follows from n alone where no component is zero (below), and a
-/// sweep does not hit all that they have. For the others the sweep finds every code that there is.
+/// For the codes that floor, the code of -n is determined by n only where no component is zero (below), and a
+/// sweep does not reach all of their codes. For the others the sweep finds every existing code.
 TYPED_TEST(RoundingNormalCodes, NegateToCodesThatArePacked) {
   for (const std::uint16_t code : packed_codes<TypeParam>())
     ASSERT_TRUE(packed_codes<TypeParam>().contains(TypeParam::negate(code))) << code;
@@ -286,7 +286,8 @@ TEST(OctahedralNormalCode, ByHand) {
   EXPECT_EQ(OctahedralNormalCode::pack({-1e-9f, -20.0f, -107.0f}), 107 << 8 | (256 - 127));
 }
 
-/// The code of `nearest` is the nearest point of the lattice on the face, judged by trying all that are near.
+/// The code of `nearest` is the nearest point of the lattice on the face, verified by testing all points
+/// nearby.
 TEST(NearestNormalCode, IsNearestOnTheFace) {
   std::mt19937 generator(7);
   std::uniform_real_distribution<double> coordinate(0.0, 127.0);
@@ -318,5 +319,5 @@ TEST(NormalCodeNames, AreParsedBack) {
   }
 }
 
-}  // namespace
+}  // namespace normal_code_test
 }  // namespace hermesh

@@ -8,15 +8,16 @@
 
 #include "algorithms/core/parallel.h"
 #include "algorithms/hermite/samplers.h"
+#include "algorithms/lattice/block_table.h"
 #include "algorithms/lattice/sample_side.h"
 
 namespace hermesh {
 namespace {
 
-/// A point this close to a triangle's border or to an edge's end, in voxels, counts as on it, so that no line
-/// slips through between two triangles and no hit between two edges.
+/// Distance in voxels within which a point counts as on a triangle's border or at an edge's end, so that no
+/// line passes between two triangles and no hit between two edges.
 constexpr double kTolerance = 1e-7;
-/// How far off the grid lines triangles are looked at, in voxels: farther than the places of sides are.
+/// Distance from grid lines within which triangles are tested, in voxels: more than the shift of sides.
 constexpr double kReach = 1e-5;
 
 struct IndexTriangle {
@@ -24,19 +25,10 @@ struct IndexTriangle {
   Eigen::Vector3d normal;     ///< unit length
 };
 
-using Key = std::array<std::int32_t, 3>;
-struct KeyHash {
-  std::size_t operator()(const Key& k) const {
-    const auto mix = [](std::uint64_t v) { return (v ^ (v >> 31)) * 0x9e3779b97f4a7c15u; };
-    return mix(mix(mix(static_cast<std::uint32_t>(k[0])) + static_cast<std::uint32_t>(k[1])) +
-               static_cast<std::uint32_t>(k[2]));
-  }
-};
-
-/// Whether the triangles, whose normals have twice their areas as lengths here, are wound inside out: their
-/// signed volume is negative. The volume of an open mesh is that of the cone from an apex, and must be
-/// negative wherever in the mesh's box the apex is. (It is linear in the apex.) The volume of a flat sheet is
-/// rounding, and says nothing.
+/// Returns true if the triangles, whose normals here have twice their areas as lengths, are wound inside out:
+/// their signed volume is negative. The volume of an open mesh is that of the cone from an apex, and must be
+/// negative for every apex in the mesh's box. (It is linear in the apex.) The volume of a flat sheet is
+/// rounding.
 bool is_inside_out(const std::vector<IndexTriangle>& triangles) {
   if (triangles.empty()) return false;
   Eigen::AlignedBox3d box;
@@ -61,25 +53,25 @@ std::vector<IndexTriangle> to_index_space(const PolygonMesh& mesh, const IndexTo
   std::vector<IndexTriangle> result(triangles.size());
   for (std::size_t i = 0; i < triangles.size(); ++i) {
     IndexTriangle& t = result[i];
-    // In double precision, relative to the base of the placement, so that coordinates are small.
+    // In double precision, relative to the base of the placement.
     for (int c = 0; c < 3; ++c) t.corner[c] = inverse * (mesh.points[triangles[i][c]].cast<double>() + shift);
     t.normal = (t.corner[1] - t.corner[0]).cross(t.corner[2] - t.corner[0]);
   }
-  // Then the normals are turned, so that they can tell an entry from an exit.
+  // Outward normals distinguish an entry from an exit.
   const double turn = is_inside_out(result) ? -1.0 : 1.0;
   for (IndexTriangle& t : result) {
     const double length = t.normal.norm();
-    // A triangle without an area keeps a normal of 0: it is met by no line, and faces no way.
+    // A triangle without an area has a normal of 0 and is hit by no line.
     if (length > 0) t.normal /= turn * length;
   }
   return result;
 }
 
-/// How far around a block its triangles are gathered, in voxels: a crossing edge that no polygon hits has one
-/// at about this distance, for it is there because a sample next to the surface has the wrong sign.
+/// Distance around a block within which its triangles are gathered, in voxels: a crossing edge that no
+/// polygon hits has one at about this distance, due to a sample of the wrong sign next to the surface.
 constexpr double kNearby = 1.0;
 
-/// Point of a triangle nearest to p (Ericson, Real-Time Collision Detection, §5.1.5).
+/// Returns the point of a triangle nearest to p (Ericson, Real-Time Collision Detection, §5.1.5).
 Eigen::Vector3d nearest_point(const IndexTriangle& triangle, const Eigen::Vector3d& p) {
   const Eigen::Vector3d &a = triangle.corner[0], &b = triangle.corner[1], &c = triangle.corner[2];
   const Eigen::Vector3d ab = b - a, ac = c - a, ap = p - a, bp = p - b, cp = p - c;
@@ -95,7 +87,8 @@ Eigen::Vector3d nearest_point(const IndexTriangle& triangle, const Eigen::Vector
   return a + ab * (vb / (va + vb + vc)) + ac * (vc / (va + vb + vc));
 }
 
-/// For each block the triangles whose box comes near the edges that it owns: block b's are list[first[b]] … .
+/// For each block the triangles whose box is near the edges that it owns: those of block b start at
+/// list[first[b]].
 struct TriangleBins {
   std::vector<std::uint64_t> first;
   std::vector<std::uint32_t> list;
@@ -105,12 +98,12 @@ TriangleBins bin_triangles(const std::vector<IndexTriangle>& triangles, const Fl
                            RunContext& context) {
   const auto& blocks = hermite.leaves;
   const auto& base = hermite.placement.base;
-  // Blocks of crossing edges by place. Nothing walks over the map, so that its order is of no account.
-  std::unordered_map<Key, std::uint32_t, KeyHash> index;
+  // Blocks of crossing edges by position. The order of the map does not matter.
+  std::unordered_map<BlockAt, std::uint32_t, BlockHash> index;
   index.reserve(blocks.size());
-  Key lowest{}, highest{};
+  BlockAt lowest{}, highest{};
   for (std::size_t b = 0; b < blocks.size(); ++b) {
-    Key key;
+    BlockAt key;
     for (int a = 0; a < 3; ++a) {
       key[a] = (blocks[b].lower[a] - base[a]) >> 3;
       lowest[a] = b == 0 ? key[a] : std::min(lowest[a], key[a]);
@@ -125,7 +118,7 @@ TriangleBins bin_triangles(const std::vector<IndexTriangle>& triangles, const Fl
     const std::size_t end = std::min(triangles.size(), (chunk + 1) * kChunk);
     for (std::size_t t = chunk * kChunk; t < end; ++t) {
       const auto& c = triangles[t].corner;
-      Key from, to;
+      BlockAt from, to;
       for (int a = 0; a < 3; ++a) {
         const double lower = std::min({c[0][a], c[1][a], c[2][a]}) - kNearby;
         const double upper = std::max({c[0][a], c[1][a], c[2][a]}) + kNearby;
@@ -134,8 +127,8 @@ TriangleBins bin_triangles(const std::vector<IndexTriangle>& triangles, const Fl
         from[a] = std::max(from[a], lowest[a]);
         to[a] = std::min(to[a], highest[a]);
       }
-      // The box of a large slanting triangle holds many blocks that its plane does not come near: half the
-      // block and kNearby along the normal.
+      // The box of a large slanting triangle holds many blocks far from its plane: half the block and kNearby
+      // along the normal.
       const double extent = triangles[t].normal.cwiseAbs().sum() * (4.0 + kNearby);
       for (int x = from[0]; x <= to[0]; ++x)
         for (int y = from[1]; y <= to[1]; ++y)
@@ -147,8 +140,8 @@ TriangleBins bin_triangles(const std::vector<IndexTriangle>& triangles, const Fl
           }
     }
   });
-  // Count – scan – fill. Chunks are taken in order, so each block lists its triangles in ascending order,
-  // whatever the threads did: equal hits go to the lowest number.
+  // Count, scan, fill, by chunks in order, so that each block lists its triangles in ascending order: equal
+  // hits go to the lowest number.
   TriangleBins bins;
   bins.first.assign(blocks.size() + 1, 0);
   for (const auto& pairs : found)
@@ -162,10 +155,10 @@ TriangleBins bin_triangles(const std::vector<IndexTriangle>& triangles, const Fl
   return bins;
 }
 
-/// Chooses among the hits of one leaf's crossing edges.
+/// Selects among the hits of one leaf's crossing edges.
 class LeafHits {
  public:
-  /// `crossings` are the leaf's, by rank, as the level set has them.
+  /// `crossings` are the leaf's, by rank, from the level set.
   LeafHits(const SignLeaf& leaf, std::span<EdgeCrossing> crossings, const std::array<std::int32_t, 3>& base)
       : leaf_(leaf), edges_(crossing_edges(leaf)) {
     for (int a = 0; a < 3; ++a) lower_[a] = leaf.lower[a] - base[a];
@@ -174,9 +167,9 @@ class LeafHits {
       for_each_bit(edges_[axis], [&](int sample) { crossing_[axis][sample] = next++; });
   }
 
-  /// Where an edge is looked for: between the places that its ends' sides are taken from, which no polygon
-  /// through a sample holds; or, where the signs are those of a voxelizer that knows no such places, at the
-  /// samples themselves.
+  /// The edge that is intersected: between the points that define the sides of its ends, which no polygon
+  /// through a sample contains; or between the samples themselves, if the signs are those of a voxelizer that
+  /// does not use such points.
   enum class EdgePlace { of_sides, of_samples };
 
   /// Intersects one triangle with the block's edges along one axis.
@@ -189,8 +182,7 @@ class LeafHits {
       return std::array<int, 2>{static_cast<int>(std::ceil(std::clamp(low, 0.0, 100.0))),
                                 static_cast<int>(std::floor(std::clamp(high, -1.0, double(limit))))};
     };
-    // Lattice lines along the axis that pass through the box of the triangle. A leaf owns edges that start at
-    // samples 0 to 7.
+    // Lattice lines along the axis that pass through the box of the triangle.
     const auto [u0, u1] = range(u, 7);
     const auto [v0, v1] = range(v, 7);
     const double shift = place == EdgePlace::of_sides ? 1.0 : 0.0;
@@ -204,20 +196,20 @@ class LeafHits {
     for (int pu = u0; pu <= u1; ++pu)
       for (int pv = v0; pv <= v1; ++pv) {
         const double x = lower_[u] + pu, y = lower_[v] + pv;
-        // Barycentric weights of the line in the projection of the triangle along the axis; all of one sign
-        // where it is met.
+        // Barycentric weights of the line in the projection of the triangle along the axis: all of one sign
+        // if it is hit.
         const Eigen::Vector3d w =
             weights(x + shift * kSideShift[std::size_t(u)], y + shift * kSideShift[std::size_t(v)]);
         const double area = w.sum();
         if (area == 0 || (w / area).minCoeff() < -kTolerance) continue;
-        // Whether the edge is met is decided there, and where it is, on the edge between the samples.
+        // The hit is tested between the points that define the sides, and located between the samples.
         const double met = w.dot(along) / area - lower_[axis] - shift * kSideShift[std::size_t(axis)];
         const double hit = weights(x, y).dot(along) / area - lower_[axis];
         offer(axis, u, v, pu, pv, met, hit, triangle.normal, place);
       }
   }
 
-  /// Whether some crossing edge was met by no polygon.
+  /// Returns true if a crossing edge was hit by no polygon.
   bool misses_some() const {
     for (int axis = 0; axis < 3; ++axis) {
       bool missed = false;
@@ -227,7 +219,7 @@ class LeafHits {
     return false;
   }
 
-  /// Writes the chosen hits; `nearby` are the numbers of the triangles that came near the block.
+  /// Writes the selected hits; `nearby` are the numbers of the triangles near the block.
   void write(const std::vector<IndexTriangle>& triangles, std::span<const std::uint32_t> nearby,
              PolygonSampling& sampling) const {
     for (int axis = 0; axis < 3; ++axis)
@@ -252,11 +244,12 @@ class LeafHits {
     Eigen::Vector3d normal = Eigen::Vector3d::Zero();
     bool consistent = false;
     bool of_samples = false;
-    int hits = 0;  ///< at different places
+    int hits = 0;  ///< at different positions
   };
 
-  /// Gives an edge that no polygon hits a crossing: the plane of the polygon nearest to the level set's
-  /// crossing, if it faces the way that the signs say, met as near to the edge as the edge's ends allow.
+  /// Sets the crossing of an edge that no polygon hits: the plane of the polygon nearest to the level set's
+  /// crossing that faces the way given by the signs, intersected as near to the edge as the edge's ends
+  /// allow.
   bool take_nearest(int axis, int sample, const std::vector<IndexTriangle>& triangles,
                     std::span<const std::uint32_t> nearby) const {
     EdgeCrossing& found = *crossing_[axis][sample];
@@ -279,8 +272,7 @@ class LeafHits {
     return true;
   }
 
-  /// `met`: where the edge is met as `place` has it, from the leaf's lower end; `hit`: the same between the
-  /// samples.
+  /// `met` is the hit for `place`, measured from the leaf's lower end; `hit` is the hit between the samples.
   void offer(int axis, int u, int v, int pu, int pv, double met, double hit, const Eigen::Vector3d& normal,
              EdgePlace place) {
     if (!(met >= -kTolerance && met <= 8.0 + kTolerance)) return;
@@ -294,14 +286,15 @@ class LeafHits {
       const int sample = sample_index(local[0], local[1], local[2]);
       if (!test(edges_[axis], sample)) continue;
       Best& best = best_[axis][sample];
-      // Hits at the places of sides win: the second pass is for edges that got none.
+      // Hits between the points that define the sides take precedence: the second pass is for edges without
+      // any.
       if (place == EdgePlace::of_samples && best.hits > 0 && !best.of_samples) continue;
       const bool consistent = (normal[axis] > 0) == test(leaf_.inside, sample);
       const double away = std::abs(offset - crossing_[axis][sample]->offset);
       const bool first = best.hits == 0;
       if (first || std::abs(best.offset - offset) > kTolerance) ++best.hits;
-      // A hit that passes the way that the signs say beats one that does not; among equals the one nearer to
-      // the level set's own crossing wins, and of those the first.
+      // A hit in the direction of the signs beats one against it; among equals the one nearer to the level
+      // set's own crossing wins, and of those the first.
       const bool better = consistent != best.consistent ? consistent : away < best.away;
       if (first || better)
         best = {offset, away, normal, consistent, place == EdgePlace::of_samples, best.hits};
@@ -335,7 +328,6 @@ FloatHermite sample_polygons(const LevelSet& level_set, double isovalue, const P
       for (const std::uint32_t t : nearby)
         for (int axis = 0; axis < 3; ++axis) hits->add(triangles[t], axis, place);
     };
-    // A leaf's hits are chosen by one thread and written to crossings of its own.
     add_all(LeafHits::EdgePlace::of_sides);
     if (hits->misses_some()) add_all(LeafHits::EdgePlace::of_samples);
     hits->write(triangles, nearby, counts[b]);

@@ -11,7 +11,7 @@
 #include "algorithms/hermite/test_normals.h"
 
 namespace hermesh {
-namespace {
+namespace samplers_test {
 
 using Eigen::Vector3d;
 
@@ -109,9 +109,10 @@ TEST(PolygonSampler, HitsAreExactWhicheverWayThePolygonsAreWound) {
   }
 }
 
-/// An open mesh's volume depends on where it is measured from, and the origin is no place of its own: away
-/// from it in either direction (but not so far that index coordinates have another base) the data are those
-/// at the origin. Edges without a hit tell, which want a polygon that looks outwards.
+/// The volume of an open mesh depends on the reference point, and the world's origin is not a suitable one:
+/// away from it in either direction (but not so far that index coordinates have another base) the data equal
+/// those at the origin. Edges without a hit detect a dependence, because they require a polygon that faces
+/// outwards.
 TEST(PolygonSampler, AnOpenMeshIsNotTurnedOverForItsPlace) {
   initialize_openvdb();
   constexpr double kHalf = 12.4;
@@ -180,5 +181,5 @@ TEST(PolygonSampler, OfSeveralHitsOneAgreesWithTheSigns) {
   EXPECT_EQ(checked, 64);
 }
 
-}  // namespace
+}  // namespace samplers_test
 }  // namespace hermesh

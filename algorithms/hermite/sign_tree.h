@@ -1,5 +1,5 @@
-// Between the signs of SparseHermite and OpenVDB trees that have a sign for every sample: trees of dense
-// voxels, and the tree of bits in files. Heavy (OpenVDB): include it from .cpp files.
+// Conversions between the signs of SparseHermite and OpenVDB trees that have a sign for every sample: trees
+// of dense voxels, and the tree of bits in files. Heavy (OpenVDB): include it from .cpp files.
 #pragma once
 
 #include <tbb/parallel_sort.h>
@@ -19,8 +19,8 @@ using Position = std::array<std::int32_t, 3>;
 inline Position position(const openvdb::Coord& at) { return {at.x(), at.y(), at.z()}; }
 inline openvdb::Coord coord(const Position& at) { return {at[0], at[1], at[2]}; }
 
-/// Calls f(slot, inside) for every slot of an internal node that has no child. Slots follow one another along
-/// z, so that a sign is looked up once for every run of them: no leaf lies in a run to change it.
+/// Calls f(slot, inside) for every slot of an internal node that has no child. Slots are consecutive along z,
+/// so a sign is looked up once for every run without children.
 template <class Node, class Crossing, class F>
 void for_each_tile(const Node& node, const SparseHermite<Crossing>& hermite, F&& f) {
   constexpr openvdb::Index kColumn = (1u << Node::LOG2DIM) - 1;
@@ -34,8 +34,8 @@ void for_each_tile(const Node& node, const SparseHermite<Crossing>& hermite, F&&
   }
 }
 
-/// Calls f(place, inside) for every place between two children of the root in a column along z. Before the
-/// first and behind the last all samples have the outermost sign.
+/// Calls f(place, inside) for the origin of every gap between two children of the root in a column along z.
+/// Before the first and after the last child all samples have the outermost sign.
 template <class Root, class Crossing, class F>
 void for_each_gap(const Root& root, const SparseHermite<Crossing>& hermite, F&& f) {
   constexpr std::int64_t kWidth = Root::ChildNodeType::DIM;
@@ -72,7 +72,7 @@ Grouped grouped(std::size_t size, std::int32_t width, Lower&& lower) {
   return result;
 }
 
-/// Makes the nodes above `children`, in parallel, and gives them their tiles. `child(i)` gives up a child.
+/// Makes the nodes above `children`, in parallel, with their tiles. `child(i)` releases a child.
 template <class Node, class Crossing, class Lower, class Child>
 std::vector<std::unique_ptr<Node>> nodes_above(const SparseHermite<Crossing>& hermite, std::size_t children,
                                                const std::array<typename Node::ValueType, 2>& values,
@@ -91,7 +91,7 @@ std::vector<std::unique_ptr<Node>> nodes_above(const SparseHermite<Crossing>& he
   return nodes;
 }
 
-/// A tree with a leaf for each of `hermite` and tiles of `values`, outside and inside, elsewhere.
+/// Makes a tree with a leaf for each of `hermite` and tiles of `values`, outside and inside, elsewhere.
 /// `make_leaf(i)` makes a leaf of the tree and is called in parallel.
 template <class Tree, class Crossing, class MakeLeaf>
 typename Tree::Ptr make_tree(const SparseHermite<Crossing>& hermite,
@@ -114,8 +114,8 @@ typename Tree::Ptr make_tree(const SparseHermite<Crossing>& hermite,
   return tree;
 }
 
-/// The leaves of a tree in the order of SparseHermite, with signs. @throws Error if a place is no multiple of
-/// 8 or so far away that its neighbours' coordinates would overflow.
+/// Returns the leaves of a tree in the order of SparseHermite, with signs. @throws Error if a position is not
+/// a multiple of 8 or so far away that its neighbours' coordinates would overflow.
 template <class Tree, class IsInside>
 LargeArray<SignLeaf> leaf_signs(const std::vector<const typename Tree::LeafNodeType*>& sources,
                                 RunContext& context, IsInside&& is_inside) {
@@ -135,7 +135,7 @@ LargeArray<SignLeaf> leaf_signs(const std::vector<const typename Tree::LeafNodeT
   return leaves;
 }
 
-/// Fills in the layers beyond the leaves of a tree, which are all there, and gives the number of crossing
+/// Sets the layers beyond the leaves of a tree, which are all present, and returns the number of crossing
 /// edges of each.
 template <class Tree, class Crossing, class IsInside>
 std::vector<std::uint64_t> complete_leaves(const Tree& tree, SparseHermite<Crossing>& all,
@@ -156,9 +156,9 @@ std::vector<std::uint64_t> complete_leaves(const Tree& tree, SparseHermite<Cross
   return owned;
 }
 
-/// Signs of a tree, with room for the crossings, and the tree's leaves that they came from. Leaves that own
-/// no crossing edge are left out. The result is sound where the tree is; check_consistent(), check_columns()
-/// and check_tiles() tell.
+/// Reads the signs of a tree, with room for the crossings, and returns the tree's leaves that they came from.
+/// Leaves that own no crossing edge are omitted. The result is valid if the tree is; check_consistent(),
+/// check_columns() and check_tiles() verify it.
 template <class Crossing, class Tree, class IsInside>
 std::vector<const typename Tree::LeafNodeType*> read_signs(const Tree& tree, SparseHermite<Crossing>& hermite,
                                                            RunContext& context, IsInside&& is_inside) {
@@ -184,8 +184,8 @@ std::vector<const typename Tree::LeafNodeType*> read_signs(const Tree& tree, Spa
   return sources;
 }
 
-/// @throws Error if two columns of missing leaves disagree side by side. Where both are missing, one of the
-/// two runs of missing leaves begins behind a leaf; so it is enough to look there.
+/// @throws Error if two adjacent columns of missing leaves disagree. If both are missing, one of the two runs
+/// of missing leaves begins after a leaf; so it suffices to check there.
 template <class Crossing>
 void check_columns(const SparseHermite<Crossing>& hermite) {
   for (const SignLeaf& leaf : hermite.leaves) {
@@ -199,8 +199,7 @@ void check_columns(const SparseHermite<Crossing>& hermite) {
   }
 }
 
-/// @throws Error if a sample of the tree without a leaf of `hermite` has another sign than SparseHermite
-/// says.
+/// @throws Error if a sample of the tree without a leaf of `hermite` has another sign than in SparseHermite.
 template <class Tree, class Crossing, class IsInside>
 void check_tiles(const Tree& tree, const SparseHermite<Crossing>& hermite, IsInside&& is_inside) {
   const auto check = [](bool a, bool b) {

@@ -1,7 +1,8 @@
 // Booleans of polygonal solids: both on one lattice, as level sets for the signs and with their exact Hermite
-// data, which keep the operands' creases and those where their surfaces meet.
+// data, which preserve the operands' creases and those where their surfaces meet.
 #pragma once
 
+#include <cstddef>
 #include <functional>
 #include <string>
 
@@ -18,8 +19,8 @@ struct SharedLattice {
   Eigen::Vector3d origin = Eigen::Vector3d::Zero();
 };
 
-/// The lattice of two meshes, about choose_origin() of the box about both, so that it does not matter which
-/// comes first, and near the zero of the world samples lie at multiples of the voxel size.
+/// Returns the lattice of two meshes, about choose_origin() of their common box, so that their order does not
+/// matter, and near the zero of the world samples lie at multiples of the voxel size.
 SharedLattice shared_lattice(const PolygonMesh& a, const PolygonMesh& b, double voxel_size);
 
 struct SampledSolid {
@@ -31,12 +32,12 @@ struct SampledSolid {
 /// Samples polygons at multiples of the voxel size from the mesh's origin.
 using SampleMesh = std::function<SampledSolid(const PolygonMesh&)>;
 
-/// Samples a mesh where it lies near the lattice's origin as it is, and elsewhere about a sample nearby, so
-/// that single precision is lost by no more than 2⁻¹³ voxels.
+/// Samples a mesh unchanged near the lattice's origin, and elsewhere relative to a sample nearby, so that
+/// single precision loses at most 2⁻¹³ voxels.
 /// @throws Error for a mesh of more than 2³⁰ voxels' distance; if the level set has no sample inside.
 SampledSolid sample_solid(const PolygonMesh& mesh, const SharedLattice& lattice, const SampleMesh& sample);
 
-/// A sentence on the crossing edges of a solid that hit no polygon; empty where all hit one.
+/// Returns a note on the crossing edges of a solid that hit no polygon; empty if all hit one.
 std::string missed_edges_note(const PolygonSampling& sampling);
 
 /// Signs and crossings of a combination, by the rule of boolean_rule.h: a sample's sign is the Boolean of the
@@ -49,5 +50,24 @@ struct CombinedSolid {
 /// Combines two solids on one lattice. The bytes of a union and an intersection do not depend on which
 /// operand comes first. @throws Error as combine() of the Hermite data does.
 CombinedSolid combine(Boolean boolean, const SampledSolid& a, const SampledSolid& b, RunContext& context);
+
+/// Loss of a combination between samples (trap T10, boolean_rule.h): parts of edges that both operands cross
+/// in opposite directions, between the two crossings: of an intersection or a difference slivers of material
+/// that are lost, of a union gaps that are filled. No sample lies in them.
+struct LostSlivers {
+  std::size_t edges = 0;  ///< number of edges with such a part
+  double volume = 0.0;    ///< estimate in cubic voxels, by the lattice lines of the axis with the largest sum
+  double longest =
+      0.0;  ///< length of the longest part, voxels: the thickness there if the edge is perpendicular
+  Eigen::Vector3d place = Eigen::Vector3d::Zero();  ///< middle of the longest part, world units
+};
+
+/// Computes the loss of the combination of two operands on one lattice. Parts of less than a thousandth of a
+/// voxel count as rounding. Symmetric in the operands of a union and an intersection.
+LostSlivers lost_slivers(Boolean boolean, const FloatHermite& a, const FloatHermite& b);
+
+/// Returns a note on the parts of the result that are thinner than a voxel of that size (world units). (Parts
+/// that an operand lost by itself are reported when it is voxelized.)
+std::string lost_slivers_note(const LostSlivers& lost, Boolean boolean, double voxel_size);
 
 }  // namespace hermesh

@@ -3,12 +3,11 @@
 #include <gtest/gtest.h>
 
 #include "algorithms/core/error.h"
-#include "algorithms/hermite/lost_slivers.h"
 #include "algorithms/io/mesh_file.h"
 #include "algorithms/variants.h"
 
 namespace hermesh {
-namespace {
+namespace solids_test {
 
 using Eigen::Vector3d;
 
@@ -119,5 +118,5 @@ TEST_F(Solids, WhatEnclosesNothingIsRefused) {
   EXPECT_THROW(sampled(to_polygon_mesh(sheet), {1.0, Vector3d::Zero()}), Error);
 }
 
-}  // namespace
+}  // namespace solids_test
 }  // namespace hermesh

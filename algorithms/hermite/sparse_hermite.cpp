@@ -4,7 +4,7 @@
 #include <string>
 
 #include "algorithms/core/parallel.h"
-#include "algorithms/hermite/with_normal_code.h"
+#include "algorithms/hermite/normal_codes.h"
 
 namespace hermesh {
 namespace {
@@ -12,8 +12,7 @@ namespace {
 // Crossings in a task of a conversion, some microseconds of work.
 constexpr std::size_t kCrossingsPerTask = 4096;
 
-/// The data with f(crossing) in place of each crossing, in parallel. The leaves, and with them all ranks,
-/// stay.
+/// Converts each crossing by f, in parallel. The leaves, and with them all ranks, are unchanged.
 template <class To, class From, class F>
 SparseHermite<To> converted(const SparseHermite<From>& from, RunContext& context, F&& f) {
   SparseHermite<To> result;
@@ -37,14 +36,14 @@ std::string text_of(const std::array<std::int32_t, 3>& lower) {
 
 bool is_sound(const EdgeCrossing& crossing) {
   const auto& n = crossing.normal;
-  // Single precision keeps a unit length to a thousandth of this. What is NaN fails every comparison.
+  // Single precision preserves unit length to a thousandth of this. NaN fails every comparison.
   const float length = n[0] * n[0] + n[1] * n[1] + n[2] * n[2];
   return crossing.offset >= 0.0f && crossing.offset <= 1.0f && std::abs(length - 1.0f) < 1e-3f;
 }
 bool is_sound(const PackedCrossing& crossing) { return crossing.offset() <= kLastOffset; }
 
-/// @throws Error unless the samples that `leaf` claims to lie beyond its last layer along `axis` are those of
-/// `next`, or, where there is no such leaf, uniform and as the column says.
+/// @throws Error unless the samples beyond the last layer of `leaf` along `axis` are those of the next leaf,
+/// or, without such a leaf, uniform and with the sign of the column.
 template <class Crossing>
 void check_beyond(const SparseHermite<Crossing>& hermite, const SignLeaf& leaf, int axis) {
   std::array<std::int32_t, 3> there = leaf.lower;
@@ -66,7 +65,7 @@ PackedHermite pack(const FloatHermite& hermite, NormalCodeId code, RunContext& c
     return converted<PackedCrossing>(
         hermite, context, [](const EdgeCrossing& crossing) { return pack<decltype(chosen)>(crossing); });
   });
-  // Last, because converted() takes over the code of data that have none.
+  // Last, because converted() copies the unused code.
   result.normal_code = code;
   return result;
 }
@@ -79,11 +78,11 @@ FloatHermite unpack(const PackedHermite& hermite, RunContext& context) {
 }
 
 bool same_lattice(const IndexToWorld& a, const IndexToWorld& b) {
-  // Relative to the size of a voxel: a billionth in direction and size, a millionth in place, and what
-  // doubles lose far from the origin.
+  // Relative to the size of a voxel: a billionth in direction and size, a millionth in position, and rounding
+  // far from the origin.
   const double size = a.linear.cwiseAbs().maxCoeff();
   if (!((a.linear - b.linear).cwiseAbs().maxCoeff() <= 1e-9 * size)) return false;
-  // Placements may divide their translation differently, so what they do to index 0 is compared.
+  // Placements may divide their translation differently, so the images of index 0 are compared.
   const auto of_index_zero = [](const IndexToWorld& p) -> Eigen::Vector3d {
     return p.offset + p.origin - p.linear * Eigen::Vector3d(p.base[0], p.base[1], p.base[2]);
   };
@@ -94,8 +93,8 @@ bool same_lattice(const IndexToWorld& a, const IndexToWorld& b) {
 
 template <class Crossing>
 void check_consistent(const SparseHermite<Crossing>& hermite) {
-  // In the order of the leaves, each against its neighbors and against the sum of crossings so far: then
-  // every rank is right.
+  // In the order of the leaves, each against its neighbors and the sum of crossings so far, which verifies
+  // all ranks.
   std::size_t next = 0;
   for (std::size_t i = 0; i < hermite.leaves.size(); ++i) {
     const SignLeaf& leaf = hermite.leaves[i];
@@ -107,12 +106,12 @@ void check_consistent(const SparseHermite<Crossing>& hermite) {
       throw Error("the Hermite data have their blocks out of order at " + text_of(leaf.lower));
     std::size_t crossings = 0;
     for (const BlockMask& axis : crossing_edges(leaf)) crossings += static_cast<std::size_t>(count(axis));
-    // A leaf that owns no crossing edge must not be there, or equal data could differ.
+    // A leaf that owns no crossing edge must be omitted, or equal data could differ.
     if (crossings == 0 || leaf.first != next)
       throw Error("the Hermite data have a wrong number of crossings in the block at " + text_of(leaf.lower));
     next += crossings;
     for (int axis = 0; axis < 3; ++axis) check_beyond(hermite, leaf, axis);
-    // A leaf that is missing below must be uniform, and so must this one's first layers agree with it.
+    // A missing lower leaf must be uniform, and this one's first layers agree with it.
     for (int axis = 0; axis < 3; ++axis) {
       std::array<std::int32_t, 3> below = leaf.lower;
       below[axis] -= 8;
@@ -125,7 +124,6 @@ void check_consistent(const SparseHermite<Crossing>& hermite) {
   if (next != hermite.crossings.size())
     throw Error("the Hermite data have " + std::to_string(hermite.crossings.size()) + " crossings for " +
                 std::to_string(next) + " crossing edges");
-  // Last, for ranks that do not add up say more about what is wrong.
   for (const Crossing& crossing : hermite.crossings)
     if (!is_sound(crossing)) throw Error("the Hermite data hold an offset or a normal that is out of range");
 }

@@ -89,8 +89,8 @@ SparseHermite<Crossing> to_sparse(const TestLattice<Crossing>& lattice,
   return result;
 }
 
-/// The lattice of sparse data: signs sample by sample and crossings edge by edge, as the sparse data's own
-/// look-ups tell them.
+/// The lattice of sparse data: signs sample by sample and crossings edge by edge, as returned by the look-up
+/// functions of the sparse data.
 template <class Crossing>
 TestLattice<Crossing> to_lattice(const SparseHermite<Crossing>& sparse, int lower, int size) {
   TestLattice<Crossing> result{lower, size, sparse.outermost_inside};
@@ -187,7 +187,7 @@ bool same_bytes(const LargeArray<Element>& a, const LargeArray<Element>& b) {
          (a.empty() || std::memcmp(a.data(), b.data(), a.size() * sizeof(Element)) == 0);
 }
 
-/// Whether two data are equal member by member and byte by byte.
+/// Returns true if two data are equal member by member and byte by byte.
 template <class Crossing>
 testing::AssertionResult same(const SparseHermite<Crossing>& a, const SparseHermite<Crossing>& b) {
   if (a.outermost_inside != b.outermost_inside)

@@ -1,4 +1,4 @@
-// For tests: the crossings of Hermite data as places with normals.
+// For tests: the crossings of Hermite data as positions with normals.
 #pragma once
 
 #include <Eigen/Core>
@@ -7,7 +7,7 @@
 
 namespace hermesh {
 
-/// Calls f(place, normal) for every crossing, in index space.
+/// Calls f(position, normal) for every crossing, in index space.
 template <class F>
 void for_each_normal(const FloatHermite& hermite, F&& f) {
   for (std::size_t leaf = 0; leaf < hermite.leaves.size(); ++leaf)

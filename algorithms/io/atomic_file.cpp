@@ -22,144 +22,121 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// The open temporary files of this process. Held for instants only, so that a thread that is about to end
-/// the process gets it even while another one is deep in its work.
+/// The temporary files of this process.
 struct Unfinished {
-  std::timed_mutex mutex;
+  std::timed_mutex mutex;  ///< locked briefly, so that the thread that ends the process can lock it, too
   std::set<std::string> paths;
-  std::mutex ending;  ///< held for as long as it takes by the thread that removes all of them
+  std::mutex ending;  ///< locked by the thread that removes all of them
 };
 
-/// Never destroyed: the thread that ends the process may run while static objects are being taken down.
+/// Never destroyed: the thread that ends the process may run during the destruction of static objects.
 Unfinished& unfinished() {
   static Unfinished* const files = new Unfinished;
   return *files;
 }
 
-/// Removes a file or folder whatever other threads do meanwhile. One may be filling a folder: that is moved
-/// aside first, so that no more files get into it. One may be removing it, and what that one takes away first
-/// is an error to this one: so it tries until nothing is left.
+/// Removes a file or directory. Another thread may be writing into the directory, so it is renamed first.
+/// Another thread may be removing it, whose progress makes this call fail, so it is retried.
 void remove_for_good(const fs::path& path) {
   std::error_code ignored;
-  const fs::path aside = path.string() + "~";
+  const fs::path renamed = path.string() + "~";
   constexpr int kTries = 1000;
   for (int i = 0; i < kTries; ++i) {
-    fs::rename(path, aside, ignored);
-    fs::remove_all(aside, ignored);
-    if (!fs::exists(aside, ignored) && !fs::exists(path, ignored)) return;
+    fs::rename(path, renamed, ignored);
+    fs::remove_all(renamed, ignored);
+    if (!fs::exists(renamed, ignored) && !fs::exists(path, ignored)) return;
     std::this_thread::sleep_for(std::chrono::milliseconds(1));
   }
 }
 
-/// A name that is hidden, in the same folder (a rename does not cross file systems), and with the same
-/// ending, which some libraries choose their format by.
-fs::path temporary_name(const fs::path& target) {
+/// Creates a file or directory in the directory of `target` (a rename does not cross file systems) by calling
+/// `make` with unused hidden names. A killed process may have left files with the same process number, which
+/// is common in containers. The names keep the extension, by which some libraries choose their format.
+/// Returns the name; `error` is 0 on success.
+template <class Make>
+fs::path make_beside(const fs::path& target, int& error, Make&& make) {
   static std::atomic<unsigned> counter = 0;
   const std::string name = target.filename().string();
   const std::string tail = name.substr(name.size() - std::min<std::size_t>(name.size(), 100));
-  return target.parent_path() /
-         (".hermesh-" + std::to_string(getpid()) + "-" + std::to_string(counter++) + "-" + tail);
-}
-
-/// Makes something new beside `target`: calls `make` with one name after the other until there was nothing of
-/// that name. What a killed process left stands in the way of another one with its number, and in a container
-/// all have the same.
-/// @returns the name; `error` is why there is nothing, if it is not 0.
-template <class Make>
-fs::path make_beside(const fs::path& target, int& error, Make&& make) {
   while (true) {
-    const fs::path name = temporary_name(target);
-    error = make(name) ? 0 : errno;
-    if (error != EEXIST) return name;
+    fs::path temporary = target.parent_path() / (".hermesh-" + std::to_string(getpid()) + "-" +
+                                                 std::to_string(counter++) + "-" + tail);
+    error = make(temporary) ? 0 : errno;
+    if (error != EEXIST) return temporary;
   }
 }
 
-/// What to write instead of `target`: where it is a link, the file behind it, for a rename would replace the
-/// link itself.
-fs::path checked_target(const fs::path& target) {
+/// Returns the file to replace: the target of a link, which a rename would replace itself.
+fs::path checked_file(const fs::path& target) {
   std::error_code error;
   const fs::file_status status = fs::status(target, error);
   if (!target.has_filename() || fs::is_directory(status))
     throw Error("cannot write '" + target.string() + "': it is a folder; name a file in it");
   if (!fs::exists(status)) return target;
-  // Renaming over a device would replace the device.
+  // A rename would replace a device.
   if (!fs::is_regular_file(status))
     throw Error("cannot write '" + target.string() + "': it is not a regular file");
   const fs::path real = fs::canonical(target, error);
   return error ? target : real;
 }
 
+fs::path checked_folder(fs::path target) {
+  if (!target.has_filename()) target = target.parent_path();  // "out/" is the directory "out"
+  std::error_code error;
+  const fs::file_status status = fs::status(target, error);
+  if (!target.has_filename() ||
+      (fs::exists(status) && !(fs::is_directory(status) && fs::is_empty(target, error))))
+    throw Error("cannot write '" + target.string() +
+                "': it exists and is not an empty folder; name a new one");
+  return target;
+}
+
 }  // namespace
 
-AtomicFile::AtomicFile(fs::path target) : target_(checked_target(target)) {
+AtomicPath::AtomicPath(fs::path target, Make make) : target_(std::move(target)) {
   const std::lock_guard lock(unfinished().mutex);
   int error = 0;
-  temporary_ = make_beside(target_, error, [](const fs::path& name) {
-    const int file = ::open(name.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
-    return file >= 0 && ::close(file) == 0;
-  });
-  if (error != 0) throw Error("cannot write '" + target.string() + "': " + std::strerror(error));
+  temporary_ = make_beside(target_, error, make);
+  if (error != 0) throw Error("cannot write '" + target_.string() + "': " + std::strerror(error));
   unfinished().paths.insert(temporary_.string());
 }
 
-AtomicFile::~AtomicFile() {
+AtomicPath::~AtomicPath() {
   if (committed_) return;
-  const std::lock_guard lock(unfinished().mutex);
-  ::unlink(temporary_.c_str());
-  unfinished().paths.erase(temporary_.string());
-}
-
-void AtomicFile::commit() {
-  const std::lock_guard lock(unfinished().mutex);
-  rename();
-}
-
-void AtomicFile::rename() {
-  if (::rename(temporary_.c_str(), target_.c_str()) != 0)
-    throw Error("cannot write '" + target_.string() + "': " + std::strerror(errno));
-  unfinished().paths.erase(temporary_.string());
-  committed_ = true;
-}
-
-AtomicFolder::AtomicFolder(fs::path target) : target_(std::move(target)) {
-  if (!target_.has_filename()) target_ = target_.parent_path();  // "out/" is the folder "out"
-  std::error_code error;
-  const fs::file_status status = fs::status(target_, error);
-  if (!target_.has_filename() ||
-      (fs::exists(status) && !(fs::is_directory(status) && fs::is_empty(target_, error))))
-    throw Error("cannot write to '" + target_.string() +
-                "': it is there already and no empty folder; name a new one");
-  const std::lock_guard lock(unfinished().mutex);
-  int failure = 0;
-  temporary_ =
-      make_beside(target_, failure, [](const fs::path& name) { return ::mkdir(name.c_str(), 0777) == 0; });
-  if (failure != 0) throw Error("cannot write to '" + target_.string() + "': " + std::strerror(failure));
-  unfinished().paths.insert(temporary_.string());
-}
-
-AtomicFolder::~AtomicFolder() {
-  if (committed_) return;
-  // A thousand files take seconds on a busy disk, for which nobody is to wait who ends the process: so
-  // without the lock, and it is on the list until all of it is gone.
+  // Without the lock, since a thousand files take seconds on a busy disk. Until all are removed, the
+  // directory stays on the list.
   std::error_code ignored;
   fs::remove_all(temporary_, ignored);
   const std::lock_guard lock(unfinished().mutex);
   unfinished().paths.erase(temporary_.string());
 }
 
-void AtomicFolder::commit() {
+void AtomicPath::commit() {
   const std::lock_guard lock(unfinished().mutex);
-  if (::rename(temporary_.c_str(), target_.c_str()) != 0)  // over an empty folder, if there is one
-    throw Error("cannot write to '" + target_.string() + "': " + std::strerror(errno));
+  rename();
+}
+
+void AtomicPath::rename() {
+  if (::rename(temporary_.c_str(), target_.c_str()) != 0)
+    throw Error("cannot write '" + target_.string() + "': " + std::strerror(errno));
   unfinished().paths.erase(temporary_.string());
   committed_ = true;
 }
 
+AtomicFile::AtomicFile(const fs::path& target)
+    : AtomicPath(checked_file(target), [](const fs::path& name) {
+        const int file = ::open(name.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
+        return file >= 0 && ::close(file) == 0;
+      }) {}
+
+AtomicFolder::AtomicFolder(fs::path target)
+    : AtomicPath(checked_folder(std::move(target)),
+                 [](const fs::path& name) { return ::mkdir(name.c_str(), 0777) == 0; }) {}
+
 void commit_together(AtomicFile& first, AtomicFile& second) {
-  // Held all the time, so that a signal's end of the process comes before or after both.
+  // Locked throughout, so that the process ends by a signal before or after both renames.
   const std::lock_guard lock(unfinished().mutex);
-  // A second name, or where the file system knows no hard links a copy, keeps the old first file until both
-  // are renamed.
+  // A hard link, or a copy if the file system has none, preserves the old first file until both are renamed.
   const bool replaces = fs::exists(first.target_);
   fs::path older;
   if (replaces) {
@@ -183,10 +160,9 @@ void commit_together(AtomicFile& first, AtomicFile& second) {
 }
 
 void remove_unfinished_files() noexcept {
-  // The exceptions of a lock that cannot be had are of no use to a process that is ending.
+  // Exceptions of a lock are useless to a process that is ending.
   try {
-    // Of two threads that end the process the second one must not do so while the first one is still
-    // removing.
+    // A second thread that ends the process waits until the first has removed all.
     const std::lock_guard ending(unfinished().ending);
     const std::unique_lock lock(unfinished().mutex, std::chrono::seconds(1));
     if (!lock.owns_lock()) return;

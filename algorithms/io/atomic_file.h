@@ -1,57 +1,52 @@
-// Write aside, then rename: a reader sees the old file or the whole new one, never half of it.
+// Atomic writes: a reader sees the old file or the complete new one.
 #pragma once
 
 #include <filesystem>
 
 namespace hermesh {
 
-/// A temporary file beside `target`, reserved by the constructor. The destructor removes it unless commit()
-/// renamed it; remove_unfinished_files() does so when the process is being cancelled.
-class AtomicFile {
+/// A temporary file or directory next to its target, removed by the destructor unless commit() has renamed
+/// it, and by remove_unfinished_files().
+class AtomicPath {
  public:
-  /// @throws Error if the folder does not exist or cannot be written.
-  explicit AtomicFile(std::filesystem::path target);
-  ~AtomicFile();
-  AtomicFile(const AtomicFile&) = delete;
-  AtomicFile& operator=(const AtomicFile&) = delete;
+  AtomicPath(const AtomicPath&) = delete;
+  AtomicPath& operator=(const AtomicPath&) = delete;
 
-  /// The temporary file, to be written by the caller.
+  /// Returns the temporary file or directory, to be written by the caller.
   const std::filesystem::path& path() const { return temporary_; }
-  /// Renames what was written to the target. @throws Error if that fails.
+  /// Renames it to the target. @throws Error if that fails.
   void commit();
 
+ protected:
+  using Make = bool (*)(const std::filesystem::path&);
+  AtomicPath(std::filesystem::path target, Make make);
+  ~AtomicPath();
+
  private:
-  friend void commit_together(AtomicFile& first, AtomicFile& second);
+  friend void commit_together(class AtomicFile& first, class AtomicFile& second);
   void rename();
   std::filesystem::path target_, temporary_;
   bool committed_ = false;
 };
 
-/// A folder of files that is there whole or not at all: write into path(), then commit().
-class AtomicFolder {
+class AtomicFile : public AtomicPath {
  public:
-  /// @throws Error if the parent folder does not exist or cannot be written, or if `target` is there and is
-  /// no empty folder.
-  explicit AtomicFolder(std::filesystem::path target);
-  ~AtomicFolder();
-  AtomicFolder(const AtomicFolder&) = delete;
-  AtomicFolder& operator=(const AtomicFolder&) = delete;
-
-  const std::filesystem::path& path() const { return temporary_; }
-  /// Renames what was written to the target. @throws Error if that fails.
-  void commit();
-
- private:
-  std::filesystem::path target_, temporary_;
-  bool committed_ = false;
+  /// @throws Error if the directory does not exist or cannot be written.
+  explicit AtomicFile(const std::filesystem::path& target);
 };
 
-/// Commits both files or neither: if the second cannot be renamed, the first target holds again what it held,
-/// or nothing. @throws Error as commit() does.
+class AtomicFolder : public AtomicPath {
+ public:
+  /// @throws Error if the parent directory does not exist or cannot be written, or if `target` exists and is
+  /// not an empty directory.
+  explicit AtomicFolder(std::filesystem::path target);
+};
+
+/// Commits both files or neither: if the second cannot be renamed, the first target is restored or removed.
+/// @throws Error like commit().
 void commit_together(AtomicFile& first, AtomicFile& second);
 
-/// Removes the temporary files of every AtomicFile and AtomicFolder that is still open: for the moment before
-/// a process ends itself.
+/// Removes all temporary files and directories, just before the process ends itself.
 void remove_unfinished_files() noexcept;
 
 }  // namespace hermesh

@@ -14,7 +14,7 @@
 #include "algorithms/core/error.h"
 
 namespace hermesh {
-namespace {
+namespace atomic_file_test {
 
 namespace fs = std::filesystem;
 
@@ -107,7 +107,7 @@ TEST_F(AtomicFileTest, WhatAKilledProcessLeftIsNotInTheWay) {
   write(open.path() / "b.txt", "b");
   open.commit();
   EXPECT_TRUE(fs::exists(folder / "out" / "b.txt"));
-  EXPECT_EQ(files().size(), 6u);  // what was left is not ours to remove
+  EXPECT_EQ(files().size(), 6u);  // existing leftovers must not be removed
 }
 
 TEST_F(AtomicFileTest, UnfinishedFilesAreRemovedFromAnotherThread) {
@@ -121,8 +121,8 @@ TEST_F(AtomicFileTest, UnfinishedFilesAreRemovedFromAnotherThread) {
   EXPECT_THROW(one.commit(), Error);
 }
 
-/// A folder of a thousand files takes a while to remove, and the process is not to end before that, nor to
-/// leave what another thread still puts in.
+/// Removing a directory of a thousand files takes a while. The process must not end before that, nor leave
+/// files that another thread still creates.
 TEST_F(AtomicFileTest, UnfinishedFoldersAreRemovedWhileOthersFillOrRemoveThem) {
   for (const bool fills : {true, false}) {
     auto open = std::make_unique<AtomicFolder>(folder / "pieces");
@@ -178,5 +178,5 @@ TEST_F(AtomicFileTest, AFolderComesWholeOrNotAtAll) {
   EXPECT_THROW(AtomicFolder(folder / "missing" / "out"), Error);
 }
 
-}  // namespace
+}  // namespace atomic_file_test
 }  // namespace hermesh

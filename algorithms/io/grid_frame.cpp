@@ -17,7 +17,7 @@ using Eigen::Vector3d;
 /// A node at the top of a tree has this many voxels along each side, and can be moved by whole sides.
 constexpr int kTop = 4096;
 
-/// Moves a node and all below it. Values and masks stay: within its node a voxel keeps its place.
+/// Moves a node and all below it; values and masks are relative to the node.
 template <class Node>
 void move_node(Node& node, const openvdb::Coord& by) {
   node.setOrigin(node.origin() + by);
@@ -29,8 +29,7 @@ template <class Tree>
 void move_tree(Tree& tree, const openvdb::Coord& by) {
   using Root = typename Tree::RootNodeType;
   Root& root = tree.root();
-  // The root is a map from places to nodes and tiles, so all of them are taken out and entered anew. Below it
-  // only origins change.
+  // The root is a map from origins to nodes and tiles, so all are removed and inserted again.
   std::vector<std::tuple<openvdb::Coord, typename Root::ValueType, bool>> tiles;
   for (auto tile = root.cbeginValueAll(); tile; ++tile)
     tiles.emplace_back(tile.getCoord(), *tile, tile.isValueOn());
@@ -45,8 +44,7 @@ void move_tree(Tree& tree, const openvdb::Coord& by) {
 }
 
 openvdb::math::Transform::Ptr transform_of(const GridFrame& frame) {
-  // OpenVDB multiplies rows from the left: the matrix is the transpose of the usual one.
-  openvdb::Mat4d matrix = openvdb::Mat4d::identity();  // of row vectors
+  openvdb::Mat4d matrix = openvdb::Mat4d::identity();  // transposed, since OpenVDB multiplies row vectors
   for (int i = 0; i < 3; ++i) {
     for (int j = 0; j < 3; ++j) matrix(i, j) = frame.voxel_size * frame.rotation(j, i);
     matrix(3, i) = frame.offset[i];
@@ -61,13 +59,12 @@ GridFrame grid_frame(const openvdb::math::Transform& transform) {
     throw Error("the grid's transform has a perspective, in which distances are not those of voxels");
   GridFrame frame;
   const Vector3d zero = to_eigen(transform.indexToWorld(openvdb::Vec3d(0, 0, 0)));
-  // Differences of far points would lose what near ones keep.
+  // Differences of transformed points would lose precision.
   const openvdb::Mat4d matrix = transform.baseMap()->getAffineMap()->getMat4();
   Eigen::Matrix3d linear;
   for (int i = 0; i < 3; ++i)
     for (int j = 0; j < 3; ++j) linear(i, j) = matrix(j, i);
-  // If all axes have one scale and right angles, the cube root of the volume is that scale, and what is left
-  // is a rotation; whether it is one is judged by how far its columns are from orthonormal.
+  // With one scale and right angles, the cube root of the volume is the scale, and the rest a rotation.
   frame.voxel_size = std::cbrt(std::abs(linear.determinant()));
   frame.rotation = linear / frame.voxel_size;
   frame.offset = zero;
@@ -86,7 +83,6 @@ GridFrame read_grid_frame(const std::filesystem::path& path) {
     VdbReader file(path);
     for (const std::string& name : file.names()) {
       const openvdb::GridBase::Ptr grid = file.read_metadata(name);
-      // Metadata and transform are enough; the tree is not read.
       if (!grid->isType<openvdb::FloatGrid>()) continue;
       return about_file(path.string(), [&] { return grid_frame(grid->transform()); });
     }
@@ -104,9 +100,8 @@ FramedMesh into_frame(const PolygonMesh& mesh, const GridFrame& frame) {
   FramedMesh result{mesh, {}};
   Vector3d moved = Vector3d::Zero();
   for (int a = 0; a < 3; ++a) {
-    // The middle of the mesh in multiples of kTop voxels. Rounded to a whole number it becomes the new
-    // origin, at most half a top node from the middle, so that points in single precision stay fine, and a
-    // tree can be moved back by whole top nodes.
+    // The middle of the mesh in multiples of kTop voxels, rounded, becomes the new origin: near enough for
+    // single precision, and a tree can be moved back by whole top nodes.
     const double middle = box.empty() ? 0.0 : 0.5 * (box.lower[a] + box.upper[a]) / frame.voxel_size / kTop;
     if (!(std::abs(middle) < (1 << 30) / kTop))
       throw Error(
@@ -127,8 +122,7 @@ void out_of_frame(const std::vector<openvdb::GridBase::Ptr>& grids, const GridFr
     if (const auto zero = grid->getMetadata<openvdb::Vec3DMetadata>(kZeroOfPositions)) {
       const auto points = openvdb::gridPtrCast<openvdb::Vec3SGrid>(grid);
       for (auto value = points->beginValueOn(); value; ++value) {
-        // Closest points are relative to their zero, so they are only turned; the zero itself is turned,
-        // moved and offset, in double precision.
+        // Relative to their zero, so they are only rotated; the zero is transformed in double precision.
         const Vector3d turned = frame.rotation * to_eigen(*value);
         value.setValue(openvdb::Vec3s(openvdb::Vec3d(turned.x(), turned.y(), turned.z())));
       }

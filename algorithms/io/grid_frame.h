@@ -1,5 +1,5 @@
-// The lattice of a volume that is there already, for another volume to share. Heavy (OpenVDB): include it
-// from .cpp files.
+// The lattice of an existing volume, for another volume to share. Heavy (OpenVDB): include it from .cpp
+// files.
 #pragma once
 
 #include <Eigen/Core>
@@ -18,25 +18,25 @@ struct GridFrame {
   Eigen::Vector3d offset = Eigen::Vector3d::Zero();
 };
 
-/// The frame of a transform. @throws Error for one in which a distance would depend on its direction (scaled
-/// differently along different axes, sheared, perspective), and for one that mirrors.
+/// Returns the frame of a transform. @throws Error if distances depend on the direction (different scales
+/// along the axes, shear, perspective), or if it mirrors.
 GridFrame grid_frame(const openvdb::math::Transform& transform);
 
-/// The frame of the first float grid in the file. @throws Error as grid_frame(), and if the file cannot be
-/// read or holds none.
+/// Returns the frame of the first float grid in the file. @throws Error like grid_frame(), and if the file
+/// cannot be read or has no float grid.
 GridFrame read_grid_frame(const std::filesystem::path& path);
 
-/// A mesh in the coordinates of a frame, near their zero.
+/// A mesh in the coordinates of a frame, near zero.
 struct FramedMesh {
   PolygonMesh mesh;          ///< sample (i, j, k) lies at voxel_size · ((i, j, k) − first)
   std::array<int, 3> first;  ///< multiples of 4096, which keep the coordinates small
 };
 
-/// The mesh turned and moved into the frame, its attributes as they are.
+/// Returns the mesh rotated and moved into the frame, with unchanged attributes.
 FramedMesh into_frame(const PolygonMesh& mesh, const GridFrame& frame);
 
-/// Gives grids that were made from a framed mesh the frame's index coordinates and transform, and closest
-/// points their place in the world.
+/// Moves grids of a framed mesh to the frame's index coordinates and transform, and closest points to the
+/// world.
 void out_of_frame(const std::vector<openvdb::GridBase::Ptr>& grids, const GridFrame& frame,
                   const std::array<int, 3>& first);
 

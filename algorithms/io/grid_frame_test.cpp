@@ -9,7 +9,7 @@
 #include "algorithms/voxelization/outputs/volume_outputs.h"
 
 namespace hermesh {
-namespace {
+namespace grid_frame_test {
 
 using Eigen::Vector3d;
 using openvdb::math::Transform;
@@ -110,5 +110,5 @@ TEST(GridFrame, DistancesThatDependOnTheDirectionAreRefused) {
   EXPECT_THROW(read_grid_frame("/nowhere/there.vdb"), Error);
 }
 
-}  // namespace
+}  // namespace grid_frame_test
 }  // namespace hermesh

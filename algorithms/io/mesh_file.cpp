@@ -15,28 +15,21 @@ namespace mesh_formats {
 
 namespace {
 
-constexpr std::array<std::string_view, 7> extensions = {".ply", ".obj",  ".off", ".stl",
-                                                        ".glb", ".gltf", ".3mf"};
-constexpr std::array<std::string_view, 7> names = {
+constexpr std::array<std::string_view, 7> kExtensions = {".ply", ".obj",  ".off", ".stl",
+                                                         ".glb", ".gltf", ".3mf"};
+constexpr std::array<const char*, 7> kFormatNames = {
     "PLY", "OBJ", "OFF", "STL", "binary glTF", "glTF in text", "a ZIP archive, as 3MF is"};
 
-std::string lower(std::string text) {
-  for (char& c : text)
-    if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
-  return text;
-}
-
-/// A cursor at the first word that is not in a comment.
+/// Returns a cursor at the first word that is not in a comment.
 TextCursor to_first_word(std::string_view bytes) {
   TextCursor cursor(bytes, "");
   cursor.skip_to_word([](std::string_view) {});
   return cursor;
 }
 
-/// The format that the content shows for certain, whatever the file is called.
+/// Returns the format that the content shows for certain.
 std::optional<Format> format_of_content(std::string_view bytes) {
-  // From the surest sign to the weakest: an exact length, then a first line, then words that text of other
-  // kinds may begin with, too.
+  // From the surest sign to the weakest: an exact length, a first line, words that other text may begin with.
   if (is_binary_stl(bytes)) return Format::stl;
   if (begins_like_ply(bytes)) return Format::ply;
   if (begins_like_glb(bytes)) return Format::glb;
@@ -46,21 +39,14 @@ std::optional<Format> format_of_content(std::string_view bytes) {
   cursor.skip_blanks();
   const bool is_off = parse_off_keyword(word).has_value();
   if (is_off && cursor.word() == "BINARY") return Format::off;
-  // The 80 bytes of text with which a binary STL file begins say what they like.
+  // A binary STL file begins with 80 bytes of any text.
   if (without_padding(bytes.substr(0, 1000)).find('\0') != std::string_view::npos) return std::nullopt;
   if (is_off) return Format::off;
-  // No text of another kind begins with a brace; what kind of JSON it is, its reader tells.
   if (word.starts_with('{')) return Format::gltf;
-  if (lower(std::string(word)) == "solid") return Format::stl;
+  if (lower_case(std::string(word)) == "solid") return Format::stl;
   for (const char* keyword : {"v", "vn", "vt", "f", "o", "g", "s", "mtllib", "usemtl"})
     if (word == keyword) return Format::obj;
   return std::nullopt;
-}
-
-/// Whether the content may be an OFF file without its keyword: such a file begins with a count.
-bool begins_with_digit(std::string_view bytes) {
-  const char first = to_first_word(bytes).peek();
-  return first >= '0' && first <= '9';
 }
 
 bool is_utf16(std::string_view bytes) {
@@ -68,42 +54,43 @@ bool is_utf16(std::string_view bytes) {
                                (bytes.starts_with("\xFE\xFF") && bytes[2] == '\0'));
 }
 
-/// @throws Error where the content shows that the file is of another format than its name says. The name
-/// decides what is read; content that tells nothing is believed, but for formats that always tell.
+/// @throws Error if the content shows another format than the name, or does not begin as the format of the
+/// name always does.
 void check_format(std::string_view bytes, Format named, const std::string& file) {
   const std::optional<Format> content = format_of_content(bytes);
+  const auto name_of = [](Format format) { return kFormatNames[static_cast<std::size_t>(format)]; };
   const std::string is_named =
-      in_quotes(file) + " is named " + std::string(extensions[static_cast<std::size_t>(named)]);
-  if (content && *content != named) throw Error(is_named + " but holds " + std::string(name_of(*content)));
+      in_quotes(file) + " is named " + std::string(kExtensions[static_cast<std::size_t>(named)]);
+  if (content && *content != named) throw Error(joined(is_named, " but holds ", name_of(*content)));
   if (content) return;
-  if (is_utf16(bytes)) throw Error(in_quotes(file) + " is text in UTF-16; save it as UTF-8 or plain ASCII");
-  // An OBJ file may begin with any of dozens of words, a damaged binary STL file with any byte, and OFF files
-  // without their keyword exist.
-  if (named == Format::ply || named >= Format::glb || (named == Format::off && !begins_with_digit(bytes)))
-    throw Error(is_named + " but does not begin like " + std::string(name_of(named)));
+  if (is_utf16(bytes))
+    throw Error(joined(in_quotes(file), " is text in UTF-16; save it as UTF-8 or plain ASCII"));
+  // An OBJ file may begin with any of dozens of words, a damaged binary STL file with any byte, and an OFF
+  // file without its keyword with a count.
+  const char first = to_first_word(bytes).peek();
+  if (named == Format::ply || named >= Format::glb || (named == Format::off && (first < '0' || first > '9')))
+    throw Error(joined(is_named, " but does not begin like ", name_of(named)));
 }
 
 }  // namespace
 
-std::string_view name_of(Format format) { return names[static_cast<std::size_t>(format)]; }
-
 std::optional<MeshPath> parse_mesh_path(const std::filesystem::path& path) {
   std::filesystem::path name = path.filename();
-  const bool gzipped = lower(name.extension().string()) == ".gz";
+  const bool gzipped = lower_case(name.extension().string()) == ".gz";
   if (gzipped) name = name.stem();
-  const auto found = std::ranges::find(extensions, lower(name.extension().string()));
-  if (found == extensions.end()) return std::nullopt;
-  return MeshPath{static_cast<Format>(found - extensions.begin()), gzipped};
+  const auto found = std::ranges::find(kExtensions, lower_case(name.extension().string()));
+  if (found == kExtensions.end()) return std::nullopt;
+  return MeshPath{static_cast<Format>(found - kExtensions.begin()), gzipped};
 }
 
 void throw_unknown_extension(const std::filesystem::path& path) {
-  throw Error(in_quotes(path.string()) + " is of an unknown type; mesh files end in " + kMeshEndings);
+  throw Error(joined(in_quotes(path.string()), " is of an unknown type; mesh files end in ", kMeshEndings));
 }
 
 namespace {
 
-/// The finaliser of splitmix64 (Steele, Lea & Flood 2014): every bit of a coordinate reaches every bit of the
-/// hash.
+/// Hashes by the finaliser of splitmix64 (Steele, Lea & Flood 2014), which mixes every bit of a coordinate
+/// into every bit of the hash.
 std::uint64_t hash_of(const Eigen::Vector3d& point) {
   std::uint64_t hash = 0;
   for (const double x : point) {
@@ -125,8 +112,7 @@ std::size_t PointMerger::slot_of(const Eigen::Vector3d& point, std::uint64_t has
 }
 
 void PointMerger::grow() {
-  // Sizes are powers of two, since slots are taken by the low bits. Growing enters all points anew; their
-  // numbers do not change.
+  // Sizes are powers of two, since the low bits select a slot.
   slots_.assign(std::max<std::size_t>(1024, 4 * slots_.size()), 0);
   for (std::size_t i = 0; i < points_.size(); ++i)
     slots_[slot_of(points_[i], hash_of(points_[i]))] = static_cast<std::uint32_t>(i + 1);
@@ -139,8 +125,6 @@ std::uint32_t PointMerger::add(const Eigen::Vector3d& point) {
   std::uint32_t& recent = recent_[hash & (recent_.size() - 1)];
   if (recent != 0 && points_[recent - 1] == canonical) return recent - 1;
   const std::size_t slot = slot_of(canonical, hash);
-  // A new point gets the next number, so that numbers depend on the order of the file alone and not on
-  // hashes.
   if (slots_[slot] == 0) {
     points_.push_back(canonical);
     slots_[slot] = static_cast<std::uint32_t>(points_.size());
@@ -150,16 +134,15 @@ std::uint32_t PointMerger::add(const Eigen::Vector3d& point) {
 }
 
 void MeshBuilder::fail_index(std::size_t polygon, std::int64_t corner) const {
-  fail("polygon " + std::to_string(polygon) + " refers to point " + std::to_string(corner) +
-       ", but there are " + std::to_string(mesh.points.size()) + " points (both count from 0)");
+  fail("polygon ", polygon, " refers to point ", corner, ", but there are ", mesh.points.size(),
+       " points (both count from 0)");
 }
 
 void MeshBuilder::add_polygon(std::span<const std::int64_t> corners) {
   const std::size_t polygon = polygons_++;
   if (attributes_) attributes_->add_polygon(corners.size());
   for (const std::int64_t corner : corners) {
-    // Points may come after the polygons that name them (in PLY and OBJ), so here it is only checked that an
-    // index fits, and the largest is kept for finish().
+    // Points may follow the polygons that name them (in PLY and OBJ), so finish() checks the largest index.
     if (corner < 0 || corner > 0xffffffff) fail_index(polygon, corner);
     if (corner > largest_) largest_ = corner, polygon_of_largest_ = polygon;
   }
@@ -169,8 +152,7 @@ void MeshBuilder::add_polygon(std::span<const std::int64_t> corners) {
   } else if (corners.size() == 4) {
     mesh.quads.push_back({at(0), at(1), at(2), at(3)});
   } else {
-    // A fan for now: whether it covers the polygon is known when the points are. Either way there are as many
-    // triangles as corners less two, so numbers and places stay.
+    // A fan for now; finish() replaces it by ears if needed, which are as many triangles.
     if (corners.size() > 4) fans_.push_back({polygon, mesh.triangles.size(), corners.size()});
     for (std::size_t i = 2; i < corners.size(); ++i) mesh.triangles.push_back({at(0), at(i - 1), at(i)});
   }
@@ -180,7 +162,7 @@ void MeshBuilder::add_polygon(std::span<const std::int64_t> corners) {
 }
 
 void MeshBuilder::number_triangles() {
-  // Where all triangles come before the first quad, or one kind is all there is, the order is that of
+  // If all triangles come before the first quad, or there is one kind only, the order is that of
   // triangulated().
   if (numbers_of_quads_.empty() || numbers_of_quads_.front() == numbers_of_triangles_.size()) return;
   mesh.triangle_numbers = std::move(numbers_of_triangles_);
@@ -201,7 +183,7 @@ void MeshBuilder::cut_concave_polygons() {
     corners.clear();
     for (const std::uint32_t number : numbers) corners.push_back(mesh.points[number]);
     if (is_fan(corners)) continue;
-    // Ears take the places of the triangles of the fan; if none are found the fan stays.
+    // Ears replace the triangles of the fan; if none are found the fan stays.
     std::vector<Triangle> cut = clip_ears(corners, context_);
     left += cut.empty();
     for (std::size_t i = 0; i < cut.size(); ++i)
@@ -209,9 +191,7 @@ void MeshBuilder::cut_concave_polygons() {
     if (attributes_ && !cut.empty()) attributes_->cut_polygon(fan.polygon, std::move(cut));
   }
   if (left > 0)
-    context_.note(
-        in_quotes(file_) + ": " + std::to_string(left) +
-        " concave polygons cross themselves; they were cut into fans, which may cover more than they do");
+    note(left, " concave polygons intersect themselves; they were cut into fans, which may cover more");
 }
 
 void MeshBuilder::add_comment(std::string_view text) {
@@ -221,7 +201,7 @@ void MeshBuilder::add_comment(std::string_view text) {
   Eigen::Vector3d origin;
   for (double& x : origin) {
     cursor.skip_space();
-    // Somebody else's comment may happen to begin with the same word.
+    // A foreign comment may begin with the same word.
     const std::optional<double> number = cursor.at_end() ? std::nullopt : cursor.number_if_any<double>();
     if (!number) return;
     x = *number;
@@ -232,8 +212,7 @@ void MeshBuilder::add_comment(std::string_view text) {
 
 void MeshBuilder::leave_out_points(const std::vector<bool>& left_out) {
   std::vector<std::size_t> kept;
-  // Points move down within their array, in order; only those left out have numbers that mean nothing, and no
-  // polygon names them.
+  // The numbers of points that are left out are meaningless, and no polygon uses them.
   std::vector<std::uint32_t> numbers(mesh.points.size());
   for (std::size_t i = 0; i < mesh.points.size(); ++i) {
     numbers[i] = static_cast<std::uint32_t>(kept.size());
@@ -251,17 +230,12 @@ void MeshBuilder::leave_out_points(const std::vector<bool>& left_out) {
   if (attributes_) attributes_->keep_points(std::move(kept));
 }
 
-/// Looks for points beyond single precision. Those that no polygon uses are left out: they must not stop the
-/// work, nor spoil what is computed of all points in single precision. @throws Error for a polygon's point
-/// that is not finite.
+/// Leaves out unused points beyond single precision, which must not affect computations over all points.
+/// Meshes are in single precision about an origin. @throws Error for a polygon's point that is not finite.
 void MeshBuilder::check_points() {
-  // Beyond single precision a point is as useless as one that is not finite, since meshes are single
-  // precision about an origin.
   const auto fits = [](const Eigen::Vector3d& point) {
-    return (point.array().abs() <= double(std::numeric_limits<float>::max()))
-        .all();  // false for what is no number, too
+    return (point.array().abs() <= double(std::numeric_limits<float>::max())).all();  // false for NaN, too
   };
-  // Nearly always nothing is wrong, and this one pass is all.
   if (std::ranges::all_of(mesh.points, fits)) return;
   std::vector<bool> left_out;
   for (const Eigen::Vector3d& point : mesh.points) left_out.push_back(!fits(point));
@@ -273,60 +247,39 @@ void MeshBuilder::check_points() {
   keep(mesh.quads);
   for (std::size_t i = 0; i < mesh.points.size(); ++i)
     if (!left_out[i] && !mesh.points[i].allFinite())
-      fail("point " + std::to_string(i) + " (counting from 0) has a coordinate that is not a finite number");
+      fail("point ", i, " (counting from 0) has a coordinate that is not a finite number");
   const auto count = std::ranges::count(left_out, true);
   if (count == 0) return;
-  note(std::to_string(count) +
-       " points that no polygon uses were left out, because they have coordinates that are not "
-       "finite numbers in single precision");
+  note(count,
+       " points that no polygon uses were left out, because they have coordinates that are not finite "
+       "numbers in single precision");
   leave_out_points(left_out);
 }
 
 MeshFile MeshBuilder::finish() {
-  // Indices come first, because all that follows looks points up by them.
   if (mesh.points.size() > 0xffffffff) fail("it has more than 2^32 points");
   if (largest_ >= static_cast<std::int64_t>(mesh.points.size())) fail_index(polygon_of_largest_, largest_);
   if (mesh.triangles.empty() && mesh.quads.empty()) fail("it holds no polygon");
   check_points();
   number_triangles();
   cut_concave_polygons();
-  if (dropped_ > 0)
-    context_.note(in_quotes(file_) + ": " + std::to_string(dropped_) +
-                  " polygons with fewer than three corners were dropped");
-  if (attributes_) {
-    mesh.attributes = attributes_->finish(context_);
-    mesh.attributes_left_out = attributes_->has_left_out();
-  }
+  if (dropped_ > 0) note(dropped_, " polygons with fewer than three corners were dropped");
+  if (attributes_) attributes_->finish(mesh, context_);
   return std::move(mesh);
+}
+
+void MeshBuilder::note_padding(std::string_view bytes) {
+  if (!std::ranges::all_of(bytes.substr(without_padding(bytes).size()), is_space))
+    note("zeros or Ctrl-Z behind the data were ignored");
 }
 
 MeshFile parse_mesh(std::string_view bytes, Format named, const std::string& file, RunContext& context,
                     const ReadOptions& options) {
   check_format(bytes, named, file);
   MeshBuilder builder(file, context, options);
-  switch (named) {
-    case Format::ply:
-      read_ply(bytes, builder);
-      break;
-    case Format::obj:
-      read_obj(bytes, builder);
-      break;
-    case Format::off:
-      read_off(bytes, builder);
-      break;
-    case Format::stl:
-      read_stl(bytes, builder);
-      break;
-    case Format::glb:
-      read_glb(bytes, builder);
-      break;
-    case Format::gltf:
-      read_gltf(bytes, builder);
-      break;
-    case Format::three_mf:
-      read_three_mf(bytes, builder);
-      break;
-  }
+  constexpr std::array<void (*)(std::string_view, MeshBuilder&), 7> readers = {
+      read_ply, read_obj, read_off, read_stl, read_glb, read_gltf, read_three_mf};
+  readers[static_cast<std::size_t>(named)](bytes, builder);
   return builder.finish();
 }
 
@@ -339,7 +292,7 @@ bool is_mesh_path(const std::filesystem::path& path) {
 MeshFile read_mesh_file(const std::filesystem::path& path, RunContext& context, const ReadOptions& options) {
   const Stage stage(context, "read");
   const std::optional<mesh_formats::MeshPath> named = mesh_formats::parse_mesh_path(path);
-  // A file that is not there, or a folder, gets a complaint about that instead, from load_bytes().
+  // load_bytes() reports a missing file or a directory.
   if (!named && std::filesystem::is_regular_file(path)) mesh_formats::throw_unknown_extension(path);
   const std::string bytes = mesh_formats::load_bytes(path, context);
   return mesh_formats::parse_mesh(bytes, named->format, path.string(), context, options);
@@ -353,23 +306,19 @@ PolygonMesh read_mesh(const std::filesystem::path& path, RunContext& context, co
 PolygonMesh to_polygon_mesh(const MeshFile& file) { return to_polygon_mesh(MeshFile(file)); }
 
 PolygonMesh to_polygon_mesh(MeshFile&& file) {
-  // Bounds of the polygons and not of the points: a stray point far away would move the origin, and cost all
-  // others precision.
+  // Bounds of the polygons, since a stray point far away would cost all others precision.
   Bounds box;
   for (const Triangle& triangle : file.triangles)
     for (const std::uint32_t corner : triangle) box.add(file.points[corner]);
   for (const Quad& quad : file.quads)
     for (const std::uint32_t corner : quad) box.add(file.points[corner]);
   PolygonMesh mesh;
-  // The origin that the writer stored gives back the same single-precision numbers.
   mesh.origin = file.origin ? *file.origin : choose_origin(box);
   mesh.triangles = std::move(file.triangles);
   mesh.quads = std::move(file.quads);
   mesh.attributes = std::move(file.attributes);
   mesh.points.reserve(file.points.size());
   for (const Eigen::Vector3d& point : file.points) {
-    // The difference is taken in double precision, so that a far origin costs nothing but the rounding of the
-    // result.
     const Eigen::Vector3f relative = (point - mesh.origin).cast<float>();
     if (!relative.allFinite())
       throw Error("the mesh has coordinates that are too large for single precision; scale it down");
@@ -385,7 +334,7 @@ MeshFile to_mesh_file(const PolygonMesh& mesh) {
   file.triangles = mesh.triangles;
   file.quads = mesh.quads;
   file.attributes = mesh.attributes;
-  // Left out only where it says nothing: at 0, which a reader would choose by itself.
+  // Left out only at 0, if a reader would choose it by itself.
   if (mesh.origin != choose_origin(bounds(mesh)) || mesh.origin != Eigen::Vector3d::Zero())
     file.origin = mesh.origin;
   return file;

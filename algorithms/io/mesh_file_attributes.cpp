@@ -1,5 +1,3 @@
-#include "algorithms/io/mesh_file_attributes.h"
-
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -11,70 +9,57 @@ namespace hermesh::mesh_formats {
 namespace {
 
 constexpr std::array<const char*, 3> domain_names = {"point", "corner", "polygon"};
-constexpr std::array<const char*, 3> domain_plurals = {"points", "corners", "polygons"};
 
-const char* name_of(AttributeDomain domain) { return domain_names[static_cast<std::size_t>(domain)]; }
-
-/// Number in the file of each element of the mesh.
-using Order = std::vector<std::size_t>;
-
-/// Order of the polygons of the mesh, as MeshBuilder::add_polygon() cuts and drops: triangles and what is cut
-/// first, each piece with the number of its polygon, then the quads.
-Order polygon_order(const std::vector<std::uint32_t>& sizes) {
-  Order order, quads;
-  for (std::size_t polygon = 0; polygon < sizes.size(); ++polygon) {
-    if (sizes[polygon] == 4) quads.push_back(polygon);
-    // All triangles of a polygon repeat its value.
-    if (sizes[polygon] == 3 || sizes[polygon] > 4) order.insert(order.end(), sizes[polygon] - 2, polygon);
-  }
-  order.insert(order.end(), quads.begin(), quads.end());
-  return order;
+/// Reorders the elements of an attribute: the one time that values move.
+void reorder(MeshAttribute& attribute, const std::vector<std::size_t>& order) {
+  const auto components = static_cast<std::size_t>(attribute.components);
+  std::visit(
+      [&]<class T>(std::vector<T>& values) {
+        std::vector<T> moved;
+        moved.reserve(order.size() * components);
+        for (const std::size_t element : order) {
+          const auto first = values.begin() + static_cast<std::ptrdiff_t>(element * components);
+          moved.insert(moved.end(), first, first + attribute.components);
+        }
+        values = std::move(moved);
+      },
+      attribute.values);
 }
 
-template <class T>
-void reorder(std::vector<T>& values, std::size_t components, const Order& order) {
-  // Values are gathered in the order of the file, because what a polygon becomes is known only when all is
-  // read; this is the one time that they move.
-  std::vector<T> moved;
-  moved.reserve(order.size() * components);
-  for (const std::size_t element : order) {
-    // The components of an element stay side by side.
-    const auto first = values.begin() + static_cast<std::ptrdiff_t>(element * components);
-    moved.insert(moved.end(), first, first + static_cast<std::ptrdiff_t>(components));
-  }
-  values = std::move(moved);
-}
-
-bool is_identity(const Order& order, std::size_t elements) {
+bool is_identity(const std::vector<std::size_t>& order, std::size_t elements) {
   if (order.size() != elements) return false;
   for (std::size_t i = 0; i < elements; ++i)
     if (order[i] != i) return false;
   return true;
 }
 
-void reorder(MeshAttribute& attribute, const Order& order, std::size_t elements) {
-  // A mesh of triangles alone, the common case, is in order already.
-  if (is_identity(order, elements)) return;
-  std::visit([&](auto& values) { reorder(values, static_cast<std::size_t>(attribute.components), order); },
-             attribute.values);
-}
-
 }  // namespace
 
-std::vector<std::size_t> AttributeBuilder::corner_order() const {
+AttributeTable::Order AttributeTable::polygon_order() const {
+  // As MeshBuilder::add_polygon() cuts and drops: triangles and cut polygons first, then the quads.
+  Order order, quads;
+  for (std::size_t polygon = 0; polygon < polygon_sizes_.size(); ++polygon) {
+    const std::uint32_t size = polygon_sizes_[polygon];
+    if (size == 4) quads.push_back(polygon);
+    if (size == 3 || size > 4) order.insert(order.end(), size - 2, polygon);
+  }
+  order.insert(order.end(), quads.begin(), quads.end());
+  return order;
+}
+
+AttributeTable::Order AttributeTable::corner_order() const {
   Order order, quads;
   std::size_t first = 0;
-  // Polygons that were cut into ears come in ascending order, so one iterator keeps step with the polygons.
   auto cut = cut_polygons_.begin();
   for (std::size_t polygon = 0; polygon < polygon_sizes_.size(); ++polygon) {
     const std::uint32_t size = polygon_sizes_[polygon];
-    if (cut != cut_polygons_.end() && cut->polygon == polygon) {
-      for (const Triangle& triangle : (cut++)->triangles)
+    if (cut != cut_polygons_.end() && cut->first == polygon) {
+      for (const Triangle& triangle : (cut++)->second)
         for (const std::uint32_t corner : triangle) order.push_back(first + corner);
     } else if (size == 4) {
       quads.insert(quads.end(), {first, first + 1, first + 2, first + 3});
     } else {
-      // The fan; a polygon of fewer than three corners, which the mesh drops, gives none.
+      // The fan; a polygon of fewer than three corners, which the mesh drops, has no triangle.
       for (std::uint32_t i = 2; i < size; ++i) order.insert(order.end(), {first, first + i - 1, first + i});
     }
     first += size;
@@ -83,138 +68,118 @@ std::vector<std::size_t> AttributeBuilder::corner_order() const {
   return order;
 }
 
-void AttributeBuilder::spoil(std::size_t attribute, const std::string& reason) {
-  // Nothing is thrown: a bad attribute must not cost the mesh. It is left out at the end, or is an Error
-  // there if it was asked for by name.
-  std::string& spoiled = gathered_[attribute].spoiled;
+void AttributeTable::spoil(std::size_t column, const std::string& reason) {
+  // Nothing is thrown yet: a bad attribute must not cost the mesh.
+  std::string& spoiled = columns_[column].spoiled;
   if (spoiled.empty()) spoiled = reason;
 }
 
-void AttributeBuilder::spoil_value(std::size_t attribute, const std::string& what) {
-  const AttributeDomain domain = gathered_[attribute].result.domain;
-  if (gathered_[attribute].spoiled.empty())
-    spoil(attribute, std::string("that of ") + name_of(domain) + " " + std::to_string(begun(domain) - 1) +
-                         " (counting from 0) " + what);
+void AttributeTable::spoil_value(std::size_t column, const std::string& what) {
+  const AttributeDomain domain = columns_[column].result.domain;
+  if (columns_[column].spoiled.empty())
+    spoil(column, std::string("that of ") + domain_names[static_cast<std::size_t>(domain)] + " " +
+                      std::to_string(begun(domain) - 1) + " (counting from 0) " + what);
 }
 
-void AttributeBuilder::set_labels(std::size_t attribute, const std::vector<std::string>& labels) {
-  // Labels are text of the file, which may hold what would control a terminal.
-  for (const std::string& label : labels) gathered_[attribute].result.labels.push_back(clean_name(label));
+void AttributeTable::set_labels(std::size_t column, const std::vector<std::string>& labels) {
+  for (const std::string& label : labels) columns_[column].result.labels.push_back(clean_name(label));
 }
 
-std::string AttributeBuilder::unused_name(std::string name, AttributeDomain domain) {
-  // First the domain goes in front, then a number behind, until nothing has that name.
-  if (names_.contains(name)) name = std::string(name_of(domain)) + "-" + name;
-  std::string unused = name;
-  while (!names_.emplace(unused, 1).second) unused = name + "-" + std::to_string(++names_[name]);
-  return unused;
+std::size_t AttributeTable::add(const std::string& name, AttributeDomain domain, int components, bool whole) {
+  Column& column = columns_.emplace_back();
+  column.result = {clean_name(name), domain, components, std::vector<float>(), {}};
+  if (whole) column.result.values = std::vector<std::int32_t>();
+  // A name that is taken gets the domain in front, then a number behind until it is free.
+  std::string& unused = column.result.name;
+  if (names_.contains(unused)) unused = domain_names[static_cast<std::size_t>(domain)] + ("-" + unused);
+  const std::string base = unused;
+  while (!names_.emplace(unused, 1).second) unused = base + "-" + std::to_string(++names_[base]);
+  of_domain_[static_cast<std::size_t>(domain)].push_back(columns_.size() - 1);
+  grow(column);
+  return columns_.size() - 1;
 }
 
-std::size_t AttributeBuilder::add(std::string name, AttributeDomain domain, int components, bool whole) {
-  Gathered& gathered = gathered_.emplace_back();
-  gathered.result = {"", domain, components, std::vector<float>(), {}};
-  if (whole) gathered.result.values = std::vector<std::int32_t>();
-  gathered.result.name = unused_name(clean_name(name), domain);
-  of_domain_[static_cast<std::size_t>(domain)].push_back(gathered_.size() - 1);
-  // The elements that have begun without it are filled like those that lack a value.
-  grow(gathered);
-  return gathered_.size() - 1;
-}
-
-void AttributeBuilder::grow(Gathered& gathered) {
-  const std::size_t size =
-      begun(gathered.result.domain) * static_cast<std::size_t>(gathered.result.components);
-  if (auto* whole = std::get_if<std::vector<std::int32_t>>(&gathered.result.values))
+void AttributeTable::grow(Column& column) {
+  const std::size_t size = begun(column.result.domain) * static_cast<std::size_t>(column.result.components);
+  if (auto* whole = std::get_if<std::vector<std::int32_t>>(&column.result.values))
     whole->resize(size, -1);
   else
-    std::get<std::vector<float>>(gathered.result.values).resize(size, 0.0f);
+    std::get<std::vector<float>>(column.result.values).resize(size, 0.0f);
 }
 
-void AttributeBuilder::reserve(AttributeDomain domain, std::size_t elements) {
-  for (Gathered& gathered : gathered_)
-    if (gathered.result.domain == domain)
-      std::visit(
-          [&](auto& values) {
-            values.reserve(values.size() + elements * static_cast<std::size_t>(gathered.result.components));
-          },
-          gathered.result.values);
+void AttributeTable::reserve(AttributeDomain domain, std::size_t elements) {
+  for (const std::size_t column : of_domain_[static_cast<std::size_t>(domain)]) {
+    MeshAttribute& attribute = columns_[column].result;
+    std::visit(
+        [&](auto& values) {
+          values.reserve(values.size() + elements * static_cast<std::size_t>(attribute.components));
+        },
+        attribute.values);
+  }
 }
 
-void AttributeBuilder::begin(AttributeDomain domain) {
-  // Every attribute of the domain grows by one filled element, so that one that is never set is 0 or −1 and
-  // not the value of a neighbor.
+void AttributeTable::begin(AttributeDomain domain) {
   ++begun(domain);
-  for (const std::size_t attribute : of_domain_[static_cast<std::size_t>(domain)]) grow(gathered_[attribute]);
+  for (const std::size_t column : of_domain_[static_cast<std::size_t>(domain)]) grow(columns_[column]);
 }
 
-void AttributeBuilder::set(std::size_t attribute, int component, double value) {
-  Gathered& gathered = gathered_[attribute];
-  // An element counts as given once, by its first component.
-  if (component == 0) ++gathered.given;
-  // The newest element is the last, so its components stand at the end.
-  const auto place = [&](auto& values) { return values.end() - gathered.result.components + component; };
-  if (auto* whole = std::get_if<std::vector<std::int32_t>>(&gathered.result.values)) {
+void AttributeTable::set(std::size_t column, int component, double value) {
+  MeshAttribute& attribute = columns_[column].result;
+  // An element is counted once, with its first component.
+  if (component == 0) ++columns_[column].given;
+  const auto newest = [&](auto& values) { return values.end() - attribute.components + component; };
+  if (auto* whole = std::get_if<std::vector<std::int32_t>>(&attribute.values)) {
     using Limits = std::numeric_limits<std::int32_t>;
-    // Negated, so that NaN is refused, too: its conversion to an integer would be undefined.
+    // Negated to refuse NaN, too, whose conversion to an integer is undefined.
     if (!(value >= Limits::min() && value <= Limits::max()))
-      return spoil_value(attribute, "does not fit into 32 bits with a sign");
-    *place(*whole) = static_cast<std::int32_t>(value);
+      return spoil_value(column, "does not fit into 32 bits with a sign");
+    *newest(*whole) = static_cast<std::int32_t>(value);
     return;
   }
   const auto single = static_cast<float>(value);
-  if (!std::isfinite(single)) return spoil_value(attribute, "is not a finite number in single precision");
-  *place(std::get<std::vector<float>>(gathered.result.values)) = single;
+  if (!std::isfinite(single)) return spoil_value(column, "is not a finite number in single precision");
+  *newest(std::get<std::vector<float>>(attribute.values)) = single;
 }
 
-void AttributeBuilder::note_missing(const Gathered& gathered, RunContext& context) {
-  const MeshAttribute& attribute = gathered.result;
-  // Elements that began, but of which no component was ever set.
-  const std::size_t missing = begun(attribute.domain) - gathered.given;
-  if (missing == 0) return;
-  const bool whole = std::holds_alternative<std::vector<std::int32_t>>(attribute.values);
-  context.note(in_quotes(file_) + ": " + std::to_string(missing) + " of " +
-               std::to_string(begun(attribute.domain)) + " " +
-               domain_plurals[static_cast<std::size_t>(attribute.domain)] + " have no " +
-               quoted_word(attribute.name) + " and get " + (whole ? "-1" : "0"));
-}
-
-void AttributeBuilder::leave_out_spoiled(RunContext& context) {
-  // Enough to see what is wrong; a damaged header may declare thousands.
+std::size_t AttributeTable::leave_out_spoiled(RunContext& context) {
+  // A damaged header may declare thousands of attributes.
   constexpr std::size_t most_notes = 8;
-  for (const Gathered& gathered : gathered_) {
-    if (gathered.spoiled.empty()) continue;
-    const std::string the_attribute =
-        in_quotes(file_) + ": the attribute " + quoted_word(gathered.result.name);
-    if (std::ranges::find(required_, gathered.result.name) != required_.end())
-      throw Error(the_attribute + " cannot be read: " + gathered.spoiled);
-    if (++left_out_ <= most_notes) context.note(the_attribute + " was left out: " + gathered.spoiled);
+  std::size_t left_out = 0;
+  for (const Column& column : columns_) {
+    if (column.spoiled.empty()) continue;
+    const std::string the_attribute = in_quotes(file_) + ": the attribute " + quoted_word(column.result.name);
+    if (std::ranges::find(required_, column.result.name) != required_.end())
+      throw Error(joined(the_attribute, " cannot be read: ", column.spoiled));
+    if (++left_out <= most_notes) context.note(joined(the_attribute, " was left out: ", column.spoiled));
   }
-  if (left_out_ > most_notes)
-    context.note(in_quotes(file_) + ": " + std::to_string(left_out_ - most_notes) +
-                 " more attributes were left out for the like");
-  std::erase_if(gathered_, [](const Gathered& gathered) { return !gathered.spoiled.empty(); });
+  if (left_out > most_notes)
+    context.note(joined(in_quotes(file_), ": ", left_out - most_notes,
+                        " more attributes were left out for similar reasons"));
+  std::erase_if(columns_, [](const Column& column) { return !column.spoiled.empty(); });
+  return left_out;
 }
 
-std::vector<MeshAttribute> AttributeBuilder::finish(RunContext& context) {
-  leave_out_spoiled(context);
-  const auto any_of = [&](AttributeDomain domain) {
-    return std::ranges::any_of(gathered_, [&](const Gathered& g) { return g.result.domain == domain; });
-  };
-  // Orders are computed only for domains that have attributes: the one of corners takes eight bytes a corner.
-  const Order polygons = any_of(AttributeDomain::polygon) ? polygon_order(polygon_sizes_) : Order();
-  const Order corners = any_of(AttributeDomain::corner) ? corner_order() : Order();
-  std::vector<MeshAttribute> attributes;
-  for (Gathered& gathered : gathered_) {
+void AttributeTable::finish(MeshFile& mesh, RunContext& context) {
+  mesh.attributes_left_out = leave_out_spoiled(context) > 0;
+  // Orders are computed only for domains with attributes: that of corners takes eight bytes per corner.
+  std::array<std::optional<Order>, 3> orders;
+  for (Column& column : columns_) {
     context.check();
-    note_missing(gathered, context);
-    const AttributeDomain domain = gathered.result.domain;
-    if (domain == AttributeDomain::polygon) reorder(gathered.result, polygons, begun(domain));
-    if (domain == AttributeDomain::corner) reorder(gathered.result, corners, begun(domain));
-    if (domain == AttributeDomain::point && kept_points_)
-      reorder(gathered.result, *kept_points_, begun(domain));
-    attributes.push_back(std::move(gathered.result));
+    MeshAttribute& attribute = column.result;
+    const AttributeDomain domain = attribute.domain;
+    if (const std::size_t missing = begun(domain) - column.given; missing > 0)
+      context.note(joined(in_quotes(file_), ": ", missing, " of ", begun(domain), " ",
+                          domain_names[static_cast<std::size_t>(domain)], "s have no ",
+                          quoted_word(attribute.name), " and get ",
+                          (attribute.values.index() == 1 ? "-1" : "0")));
+    std::optional<Order>& order = orders[static_cast<std::size_t>(domain)];
+    if (!order && domain == AttributeDomain::polygon) order = polygon_order();
+    if (!order && domain == AttributeDomain::corner) order = corner_order();
+    if (domain == AttributeDomain::point) order = kept_points_;
+    // A mesh of triangles only, the common case, is in order already.
+    if (order && !is_identity(*order, begun(domain))) reorder(attribute, *order);
+    mesh.attributes.push_back(std::move(attribute));
   }
-  return attributes;
 }
 
 }  // namespace hermesh::mesh_formats

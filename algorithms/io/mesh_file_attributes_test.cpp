@@ -1,4 +1,4 @@
-// Attributes in PLY and OBJ texts with values made by hand.
+// Attributes of PLY and OBJ texts.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -7,7 +7,7 @@
 #include "algorithms/io/mesh_file_formats.h"
 
 namespace hermesh {
-namespace {
+namespace mesh_file_attributes_test {
 
 using mesh_formats::Format;
 
@@ -189,13 +189,9 @@ TEST_F(AttributeFileTest, WhatCannotBeReadIsLeftOut) {
     EXPECT_GE(file.triangles.size(), 1u);
     for (const MeshAttribute& attribute : file.attributes) EXPECT_NE(attribute.name, name);
     EXPECT_TRUE(file.attributes_left_out);
-    EXPECT_EQ(std::ranges::count_if(context.notes,
-                                    [&](const std::string& note) {
-                                      return note.find("the attribute '" + name +
-                                                       "' was left out: " + reason) != std::string::npos;
-                                    }),
-              1)
-        << (context.notes.empty() ? "no note" : context.notes[0]);
+    const std::string words = "the attribute '" + name + "' was left out: " + reason;
+    EXPECT_EQ(std::ranges::count_if(context.notes, [&](const auto& n) { return n.find(words) != n.npos; }), 1)
+        << words << (context.notes.empty() ? "; no note" : context.notes[0]);
     const Format format = text.starts_with("ply") ? Format::ply : Format::obj;
     try {
       mesh_formats::parse_mesh(text, format, "f", context, {.attributes = true, .required = {name}});
@@ -253,7 +249,7 @@ TEST_F(AttributeFileTest, WhatCannotBeReadIsLeftOut) {
            "that of point 0 (counting from 0) is not a finite");
   left_out("v 0 0 0\nv 1 0 0 red\nv 0 1 0\nf 1 2 3\n", "colour",
            "that of point 1 (counting from 0) is no number");
-  // What no polygon refers to does no harm.
+  // Entries that no polygon refers to are harmless.
   context.notes.clear();
   EXPECT_EQ(obj(triangle + "vt nan nan\nvn 0 0 1,\nf 1/1 2/1 3/1\n").attributes.size(), 1u);
   EXPECT_TRUE(context.notes.empty());
@@ -272,5 +268,5 @@ TEST_F(AttributeFileTest, MissingValuesAreErrors) {
             std::string::npos);
 }
 
-}  // namespace
+}  // namespace mesh_file_attributes_test
 }  // namespace hermesh

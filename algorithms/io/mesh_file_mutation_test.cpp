@@ -1,6 +1,6 @@
-// Thousands of damaged files of each format: each gives a mesh or one short clean sentence, in little time
-// and memory. They are read in a child process with limits, so that a crash, a hang or a growth ends the
-// child and not the test.
+// Reads thousands of damaged files of each format: each gives a mesh or one short clean message, in little
+// time and memory. They are read in a child process with limits, so that a crash, a hang or too much memory
+// ends the child and not the test.
 #include <gtest/gtest.h>
 #include <sys/mman.h>
 #include <sys/resource.h>
@@ -8,14 +8,13 @@
 #include <sys/wait.h>
 
 #include <algorithm>
-#include <bit>
 #include <cstring>
 
 #include "algorithms/io/scenes/scene_files_for_tests.h"
 #include "algorithms/io/test_mesh_files.h"
 
 namespace hermesh {
-namespace {
+namespace mesh_file_mutation_test {
 
 using mesh_formats::Format;
 using Files = std::vector<std::string>;
@@ -25,22 +24,13 @@ struct Kind {
   Format format;
   bool text;
   Files files;  ///< undamaged
-  /// Puts what was damaged into its container, so that checksums and lengths of that are right; null where
-  /// there is none.
+  /// Packs damaged bytes into a container with correct checksums and lengths; null if there is none.
   std::string (*wrap)(const std::string& bytes) = nullptr;
 
   std::string file(const std::string& bytes) const { return wrap ? wrap(bytes) : bytes; }
 };
 
-template <class T>
-void put(std::string& bytes, T value, bool big = false) {
-  char raw[sizeof value];
-  std::memcpy(raw, &value, sizeof value);
-  if (big == (std::endian::native == std::endian::little)) std::reverse(raw, raw + sizeof value);
-  bytes.append(raw, sizeof value);
-}
-
-// ---- Undamaged files, with as much as each format can hold.
+// ---- Undamaged files that use as many features as possible.
 
 struct Ring {
   std::vector<std::array<float, 3>> points;
@@ -84,19 +74,13 @@ std::string ascii_ply(const Ring& mesh, bool strips) {
 std::string binary_ply(const Ring& mesh, bool strips, bool big) {
   std::string bytes = ply_header(big ? "binary_big_endian" : "binary_little_endian", mesh, strips);
   for (const auto& point : mesh.points) {
-    for (const float x : point) put(bytes, x, big);
-    bytes += "\xff\x01\x80";
-    put(bytes, 0.5f, big);
+    for (const float x : point) bytes += raw(x, big);
+    bytes += "\xff\x01\x80" + raw(0.5f, big);
   }
-  if (strips)
-    for (const int i : {9, 0, 1, 2, 3, -1, 4, 3, 2, 5}) put(bytes, i, big);
-  for (const Triangle& triangle : mesh.triangles) {
-    bytes += '\3';
-    for (const std::uint32_t corner : triangle) put(bytes, corner, big);
-    bytes += '\6';
-    for (const float x : {0.f, .5f, 1.f, .25f, 0.f, 1.f}) put(bytes, x, big);
-    put(bytes, std::uint16_t(triangle[0]), big);
-  }
+  if (strips) bytes += raw_list<int>({9, 0, 1, 2, 3, -1, 4, 3, 2, 5}, big);
+  for (const auto& [a, b, c] : mesh.triangles)
+    bytes += '\3' + raw_list<std::uint32_t>({a, b, c}, big) + '\6' +
+             raw_list<float>({0.f, .5f, 1.f, .25f, 0.f, 1.f}, big) + raw(std::uint16_t(a), big);
   return bytes;
 }
 
@@ -131,79 +115,48 @@ std::string off(const Ring& mesh, const std::string& keyword) {
 std::string binary_off(const Ring& mesh, bool big) {
   std::string bytes = big ? "OFF BINARY\n" : "NOFF BINARY\n";
   for (const std::size_t count : {mesh.points.size(), mesh.triangles.size(), std::size_t(0)})
-    put(bytes, std::uint32_t(count), big);
+    bytes += raw(std::uint32_t(count), big);
   for (const auto& point : mesh.points)
     for (std::size_t i = 0; i < (big ? 1 : 2); ++i)
-      for (const float x : point) put(bytes, x, big);
+      for (const float x : point) bytes += raw(x, big);
   for (const Triangle& triangle : mesh.triangles) {
-    put(bytes, 3, big);
-    for (const std::uint32_t corner : triangle) put(bytes, corner, big);
-    if (big) put(bytes, 0, big);
+    bytes += raw(3, big);
+    for (const std::uint32_t corner : triangle) bytes += raw(corner, big);
+    if (big) bytes += raw(0, big);
   }
   return bytes;
-}
-
-std::string text_stl(const Ring& mesh) {
-  std::ostringstream text;
-  text << "solid part\n";
-  for (const Triangle& triangle : mesh.triangles) {
-    text << "facet normal 0 0 1\nouter loop\n";
-    for (const std::uint32_t i : triangle)
-      text << "vertex " << mesh.points[i][0] << " " << mesh.points[i][1] << " " << mesh.points[i][2] << "\n";
-    text << "endloop\nendfacet\n";
-  }
-  return text.str() + "endsolid part\n";
-}
-
-std::string binary_stl(const Ring& mesh, std::string header) {
-  header.resize(80, ' ');
-  put(header, std::uint32_t(mesh.triangles.size()));
-  for (const Triangle& triangle : mesh.triangles) {
-    header += std::string(12, '\0');
-    for (const std::uint32_t i : triangle)
-      for (const float x : mesh.points[i]) put(header, x);
-    put(header, std::uint16_t(31));
-  }
-  return header;
 }
 
 std::string points_and_indices(const Ring& mesh) {
   std::string bytes;
-  for (const auto& point : mesh.points)
-    for (const float x : point) put(bytes, x);
-  for (const Triangle& triangle : mesh.triangles)
-    for (const std::uint32_t corner : triangle) put(bytes, std::uint16_t(corner));
+  for (const auto& [x, y, z] : mesh.points) bytes += raw_list<float>({x, y, z});
+  for (const auto& [a, b, c] : mesh.triangles)
+    bytes += raw_list<std::uint16_t>({std::uint16_t(a), std::uint16_t(b), std::uint16_t(c)});
   return bytes;
 }
 
-/// A scene of two nodes and a sparse accessor. Blanks stand about all words, so that these can be exchanged.
-std::string gltf(const Ring& mesh, const std::string& uri) {
-  const std::string points = std::to_string(mesh.points.size()),
-                    corners = std::to_string(3 * mesh.triangles.size());
-  const std::string size = std::to_string(12 * mesh.points.size()),
-                    rest = std::to_string(6 * mesh.triangles.size());
+/// Returns a scene of two nodes and a sparse accessor over the 9 points and 14 triangles of ring(7), with
+/// blanks around all words, so that these can be exchanged.
+std::string gltf(const std::string& uri) {
   return R"({ "asset" : { "version" : "2.0" } , "scene" : 0 , "scenes" : [ { "nodes" : [ 0 , 1 ] } ] ,
 "nodes" : [
 { "mesh" : 0 , "translation" : [ 1 , 2 , 3 ] } , { "children" : [ 2 ] , "scale" : [ 1 , -1 , 1 ] } ,
 { "mesh" : 0 , "rotation" : [ 0 , 0 , 0 , 1 ] } ] , "meshes" : [ { "primitives" : [
 { "attributes" : { "POSITION" : 0 } , "indices" : 1 , "mode" : 4 } ,
 { "attributes" : { "POSITION" : 0 } , "mode" : 5 } ] } ] ,
-"accessors" : [ { "bufferView" : 0 , "byteOffset" : 0 , "componentType" : 5126 , "count" : )" +
-         points +
-         R"( , "type" : "VEC3" , "sparse" : { "count" : 2 , "indices" : { "bufferView" : 1 ,
+"accessors" : [ { "bufferView" : 0 , "byteOffset" : 0 , "componentType" : 5126 , "count" : 9 ,
+"type" : "VEC3" , "sparse" : { "count" : 2 , "indices" : { "bufferView" : 1 ,
 "byteOffset" : 2 , "componentType" : 5123 } , "values" : { "bufferView" : 0 , "byteOffset" : 12 } } } ,
-{ "bufferView" : 1 , "componentType" : 5123 , "count" : )" +
-         corners + R"( , "type" : "SCALAR" } ] , "bufferViews" : [ { "buffer" : 0 , "byteLength" : )" + size +
-         R"( , "byteStride" : 12 } , { "buffer" : 0 , "byteOffset" : )" + size + R"( , "byteLength" : )" +
-         rest + R"( } ] , "buffers" : [ { )" + (uri.empty() ? "" : "\"uri\" : \"" + uri + "\" , ") +
-         R"("byteLength" : )" + std::to_string(12 * mesh.points.size() + 6 * mesh.triangles.size()) +
-         " } ] }";
+{ "bufferView" : 1 , "componentType" : 5123 , "count" : 42 , "type" : "SCALAR" } ] ,
+"bufferViews" : [ { "buffer" : 0 , "byteLength" : 108 , "byteStride" : 12 } ,
+{ "buffer" : 0 , "byteOffset" : 108 , "byteLength" : 84 } ] , "buffers" : [ { )" +
+         uri + R"("byteLength" : 192 } ] })";
 }
 
 std::string base64(const std::string& bytes) {
   const std::string digits = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
   std::string text;
-  // The bytes of the ring are a multiple of three.
+  // The bytes of a ring are a multiple of three.
   for (std::size_t i = 0; i + 2 < bytes.size(); i += 3)
     for (int k = 0; k < 4; ++k)
       text += digits[((unsigned char)bytes[i] << 16 | (unsigned char)bytes[i + 1] << 8 |
@@ -231,6 +184,11 @@ std::string model(const Ring& mesh) {
                   "unit = \"inch\" xml:lang = \"en\"");
 }
 
+/// Returns an archive with a comment behind it, in which damage is harmless.
+std::string with_comment(const std::string& archive, const std::string& comment) {
+  return archive.substr(0, archive.size() - 2) + raw(std::uint16_t(comment.size())) + comment;
+}
+
 std::vector<Kind> all_kinds() {
   const Ring mesh = ring(7);
   return {{"ascii PLY", Format::ply, true, {ascii_ply(mesh, false), ascii_ply(mesh, true)}},
@@ -238,13 +196,19 @@ std::vector<Kind> all_kinds() {
           {"OBJ", Format::obj, true, {obj(mesh)}},
           {"ascii OFF", Format::off, true, {off(mesh, "OFF"), off(mesh, "COFF")}},
           {"binary OFF", Format::off, false, {binary_off(mesh, true), binary_off(mesh, false)}},
-          {"GLB", Format::glb, false, {in_glb(gltf(mesh, ""))}},
-          {"JSON of a GLB", Format::glb, true, {gltf(mesh, "")}, in_glb},
-          {"glTF", Format::gltf, true, {gltf(mesh, "data:;base64," + base64(points_and_indices(mesh)))}},
-          {"3MF", Format::three_mf, false, {three_mf_of(model(mesh))}},
+          {"GLB", Format::glb, false, {in_glb(gltf(""))}},
+          {"JSON of a GLB", Format::glb, true, {gltf("")}, in_glb},
+          {"glTF",
+           Format::gltf,
+           true,
+           {gltf("\"uri\" : \"data:;base64," + base64(points_and_indices(mesh)) + "\" , ")}},
+          {"3MF",
+           Format::three_mf,
+           false,
+           {three_mf_of(model(mesh)), with_comment(three_mf_of(model(mesh)), std::string(2000, 'c'))}},
           {"model of a 3MF", Format::three_mf, true, {model(mesh)}, three_mf_of},
-          {"ascii STL", Format::stl, true, {text_stl(mesh)}},
-          {"binary STL", Format::stl, false, {binary_stl(mesh, "exported"), binary_stl(mesh, "solid part")}}};
+          {"ascii STL", Format::stl, true, {stl_text() + "endsolid part\n"}},
+          {"binary STL", Format::stl, false, {binary_stl(4), binary_stl(4, "solid part")}}};
 }
 
 // ---- Damage.
@@ -287,7 +251,7 @@ class Damager {
           static_cast<char>(below(2) ? random_() : bytes[below(bytes.size())] ^ (1 << below(8)));
   }
 
-  /// Puts a piece of another file, or of the file itself, in between or in place of what is there.
+  /// Inserts a piece of another file, or of the file itself, or replaces a piece by it.
   void splice(std::string& bytes) {
     const Kind& other = below(2) ? kind_ : kinds_[below(kinds_.size())];
     const std::string& from = other.files[below(other.files.size())];
@@ -329,13 +293,13 @@ class Damager {
   std::mt19937 random_;
 };
 
-// ---- What must hold of each.
+// ---- Requirements.
 
-/// What is wrong with the sentence of an error; empty if nothing is.
-std::string fault_of_sentence(const std::string& sentence) {
-  if (sentence.rfind("'damaged.file'", 0) != 0) return "does not name the file";
-  if (sentence.size() >= 300) return "is long";
-  if (!std::ranges::all_of(sentence, [](char c) { return c >= ' ' && c <= '~'; }))
+/// Returns the fault of a message; empty if it has none.
+std::string fault_of_message(const std::string& message) {
+  if (!message.starts_with("'damaged.file'")) return "does not name the file";
+  if (message.size() >= 300) return "is long";
+  if (!std::ranges::all_of(message, [](char c) { return c >= ' ' && c <= '~'; }))
     return "holds control characters";
   return "";
 }
@@ -350,7 +314,7 @@ std::string fault_of_mesh(const MeshFile& mesh) {
     return true;
   };
   if (!good(mesh.triangles) || !good(mesh.quads))
-    return "a polygon refers to a point that is not there or not finite";
+    return "a polygon refers to a point that does not exist or is not finite";
   for (const Eigen::Vector3d& point : mesh.points)
     if (!point.allFinite()) return "a point is not finite";
   if (!mesh.triangle_numbers.empty() &&
@@ -381,16 +345,16 @@ Reading read(const std::string& bytes, const Kind& kind, bool attributes) {
     reading.fault = fault_of_mesh(reading.mesh);
   } catch (const Error& error) {
     reading.error = error.what();
-    if (const std::string fault = fault_of_sentence(reading.error); !fault.empty())
+    if (const std::string fault = fault_of_message(reading.error); !fault.empty())
       reading.fault = "the error " + fault;
   }
   for (const std::string& note : context.notes)
-    if (const std::string fault = fault_of_sentence(note); !fault.empty())
+    if (const std::string fault = fault_of_message(note); !fault.empty())
       reading.fault = "the note " + fault + ": " + note;
   return reading;
 }
 
-/// Attributes change nothing but themselves: who asks for them reads the same files and the same polygons.
+/// Returns the fault of a reading, or of the same reading with attributes, which must not change the mesh.
 std::string fault_of(const std::string& bytes, const Kind& kind, bool& refused) {
   const Reading plain = read(bytes, kind, false), full = read(bytes, kind, true);
   refused = !plain.error.empty();
@@ -403,7 +367,7 @@ std::string fault_of(const std::string& bytes, const Kind& kind, bool& refused) 
   return "";
 }
 
-/// What the child process tells its parent.
+/// Results of the child process, in shared memory.
 struct Account {
   std::uint32_t trial, refused, read;
   char fault[600];
@@ -477,5 +441,5 @@ TEST(MeshFileMutations, FewHundredOfEachFormat) { expect_all_survived(400); }
 
 TEST(Slow, MeshFileMutations) { expect_all_survived(5000); }
 
-}  // namespace
+}  // namespace mesh_file_mutation_test
 }  // namespace hermesh

@@ -1,5 +1,5 @@
-// OBJ (Wavefront): lines of points (v) and polygons (f), and where attributes are asked for, colours behind
-// the points, normals (vn), texture coordinates (vt) and materials (usemtl); everything else is passed over.
+// OBJ (Wavefront): lines of points (v) and polygons (f), and on request colours behind the points, normals
+// (vn), texture coordinates (vt) and materials (usemtl); everything else is ignored.
 #include <algorithm>
 #include <map>
 
@@ -11,15 +11,15 @@ namespace {
 
 constexpr std::int64_t kNone = -1;
 
-/// A list that corners refer to by number, vt or vn, and which of its values each corner of the file has.
+/// A list that corners refer to by number, vt or vn, and the number of each corner of the file.
 struct CornerList {
   const char* attribute;
-  const char* what;  ///< for complaints
+  const char* what;  ///< for messages
   int components;
   std::vector<float> values = {};
   std::vector<std::int64_t> corners = {};  ///< from 0, or kNone
   bool used = false;
-  std::string spoiled = {};  ///< why it cannot be read
+  std::string spoiled = {};  ///< why it cannot be read; empty if it can
 
   std::int64_t size() const { return static_cast<std::int64_t>(values.size()) / components; }
 };
@@ -36,10 +36,8 @@ class ObjReader {
       builder_.tick(cursor_.offset(), bytes_.size());
       read_line();
     }
-    // What is no polygon is left out with a note: a mesh that lacks half of the model should not pass for
-    // whole.
     if (left_out_ > 0)
-      builder_.note("it holds curves, surfaces or calls of other files on " + std::to_string(left_out_) +
+      builder_.note("it holds curves, surfaces or calls of other files on ", left_out_,
                     " lines, which are not read; the mesh lacks them");
     builder_.note_padding(bytes_);
     if (builder_.attributes()) finish_attributes();
@@ -55,11 +53,9 @@ class ObjReader {
     const std::size_t start = cursor_.offset();
     const std::string_view keyword = cursor_.word();
     const char first = keyword[0];
-    // From the commonest line to the rarest. Attributes that nobody asked for are skipped like any other
-    // line.
     if (keyword == "v") {
       read_point();
-    } else if (keyword == "f" || keyword == "fo") {  // fo is what f was called at first
+    } else if (keyword == "f" || keyword == "fo") {  // the old name of f
       read_polygon();
     } else if (builder_.attributes() && keyword == "vt") {
       read_value(uvs_, 1);
@@ -68,28 +64,22 @@ class ObjReader {
     } else if (builder_.attributes() && keyword == "usemtl") {
       read_material();
     } else if ((first >= 'a' && first <= 'z') || (first >= 'A' && first <= 'Z')) {
-      // A word of letters may be a keyword of some program; anything else shows that the file is damaged, or
-      // no OBJ file.
-      left_out_ += is_other_geometry(keyword);
+      // A word of letters may be a keyword of some program; anything else is damage, or no OBJ file.
+      constexpr std::string_view geometry[] = {"curv", "surf", "call", "bzp", "bsp", "cdc", "cdp", "res"};
+      left_out_ += std::ranges::find(geometry, keyword) != std::end(geometry);
       skip_continued_line();
     } else {
       cursor_.fail_at(start, quoted_word(keyword) + " is no keyword of an OBJ file");
     }
   }
 
-  static bool is_other_geometry(std::string_view keyword) {
-    constexpr std::string_view keywords[] = {"curv", "surf", "call", "bzp", "bsp", "cdc", "cdp", "res"};
-    return std::ranges::find(keywords, keyword) != std::end(keywords);
-  }
-
   void skip_blanks() { cursor_.skip_blanks_and_continuations(); }
-
   void skip_continued_line() {
     while (cursor_.rest_of_line().ends_with('\\')) {
     }
   }
 
-  /// A point. What follows its three coordinates is a weight or a colour.
+  /// Reads a point, whose coordinates may be followed by a weight or a colour.
   void read_point() {
     Eigen::Vector3d point;
     for (double& x : point) {
@@ -101,10 +91,10 @@ class ObjReader {
     skip_continued_line();
   }
 
-  /// The colour of the newest point: three numbers, or the last three of four, of which the first is then a
-  /// weight.
+  /// Reads the colour of the newest point: three numbers, or the last three of four, a weight being the
+  /// first.
   void read_colour() {
-    AttributeBuilder& attributes = *builder_.attributes();
+    AttributeTable& attributes = *builder_.attributes();
     attributes.begin(AttributeDomain::point);
     std::array<double, 4> numbers{};
     std::size_t count = 0;
@@ -114,15 +104,14 @@ class ObjReader {
       good = good && number;
       numbers[count++] = number.value_or(0.0);
     }
-    // A lone number is the weight of a rational curve, two are nothing known: no colour, and no complaint.
+    // A single number is the weight of a rational curve, two have no meaning.
     if (count < 3 && good) return;
-    // The attribute begins with the first point that has a colour; points before it get 0.
     if (!colour_) colour_ = attributes.add("colour", AttributeDomain::point, 3, false);
     if (!good) return attributes.spoil_value(*colour_, "is no number");
     for (int i = 0; i < 3; ++i) attributes.set(*colour_, i, numbers[count - 3 + static_cast<std::size_t>(i)]);
   }
 
-  /// Reads a line of vt or vn, of which `least` numbers must be there.
+  /// Reads a line of vt or vn, which must have at least `least` numbers.
   void read_value(CornerList& list, int least) {
     skip_blanks();
     for (int i = 0; i < list.components; ++i, skip_blanks()) {
@@ -131,27 +120,26 @@ class ObjReader {
       const std::optional<float> number = missing ? 0.0f : cursor_.number_if_any<float>();
       if (!number || (missing && i < least))
         spoil(list, start, "a " + std::string(list.what) + (missing ? " is incomplete" : " is no number"));
-      // A place is kept for a bad value, too, for the numbers of those behind it count it.
+      // A bad value counts, too, in the numbering of the list.
       list.values.push_back(number.value_or(0.0f));
     }
     skip_continued_line();
   }
 
-  /// Marks a list as one that cannot be read. The polygons are read all the same.
+  /// Marks a list that cannot be read; the polygons are read anyway.
   void spoil(CornerList& list, std::size_t offset, const std::string& reason) {
     if (list.spoiled.empty())
       list.spoiled = "line " + std::to_string(cursor_.line_at(offset)) + ": " + reason;
   }
 
   void read_material() {
-    AttributeBuilder& attributes = *builder_.attributes();
+    AttributeTable& attributes = *builder_.attributes();
     skip_blanks();
     const std::string name(cursor_.rest_of_line());
     if (name.ends_with('\\')) skip_continued_line();
     if (!material_attribute_)
       material_attribute_ = attributes.add("material", AttributeDomain::polygon, 1, true);
-    // Materials are numbered in the order in which they are first used; one that comes again keeps its
-    // number.
+    // Numbered in the order of their first use.
     const auto [entry, added] = material_numbers_.emplace(name, static_cast<int>(materials_.size()));
     if (added) materials_.push_back(name);
     material_ = entry->second;
@@ -166,31 +154,28 @@ class ObjReader {
       if (index == 0) cursor_.fail("the points of an OBJ file count from 1, but a polygon refers to point 0");
       const auto points = static_cast<std::int64_t>(builder_.mesh.points.size());
       if (index < -points)
-        cursor_.fail("a polygon refers to point " + std::to_string(index) + ", but there are only " +
-                     std::to_string(points) + " points before it");
-      // What counts back must be resolved here; a number from the front may name a point that is still to
-      // come, and is checked at the end.
+        cursor_.fail("a polygon refers to point ", index, ", but there are only ", points,
+                     " points before it");
+      // Numbers that count back are resolved here; others may name a later point and are checked at the end.
       corners_.push_back(index > 0 ? index - 1 : points + index);
       if (builder_.attributes()) {
         read_corner_value(uvs_);
         read_corner_value(normals_);
       }
-      // What is left of the corner, such as its normal where nobody asked for attributes.
+      // Skips the rest of the corner, such as a normal without attributes.
       if (cursor_.peek() == '/')
         while (!cursor_.ends_word()) cursor_.advance();
       if (!cursor_.ends_word()) cursor_.fail("a corner of a polygon is not a number");
     }
-    // What is left is a comment.
-    cursor_.rest_of_line();
+    cursor_.rest_of_line();  // a comment
     builder_.add_polygon(corners_);
-    if (AttributeBuilder* attributes = builder_.attributes()) {
+    if (AttributeTable* attributes = builder_.attributes()) {
       attributes->begin(AttributeDomain::polygon);
-      // Polygons before the first usemtl have no material, which is −1.
       if (material_ >= 0) attributes->set(*material_attribute_, 0, material_);
     }
   }
 
-  /// Reads the number behind the next slash, if there is one, counted as the number of a point is.
+  /// Reads the number behind the next slash, if there is one, which counts like that of a point.
   void read_corner_value(CornerList& list) {
     list.corners.push_back(kNone);
     if (cursor_.peek() != '/') return;
@@ -212,11 +197,10 @@ class ObjReader {
   }
 
   void finish_attributes() {
-    AttributeBuilder& attributes = *builder_.attributes();
+    AttributeTable& attributes = *builder_.attributes();
     if (material_attribute_) attributes.set_labels(*material_attribute_, materials_);
+    // Only now all lists are complete: a vt or vn may follow the polygon that refers to it.
     std::vector<std::pair<std::size_t, const CornerList*>> lists;
-    // Corners are given their values when all lists are complete, because a vt or vn may stand behind the
-    // polygon that names it.
     for (const CornerList* list : {&uvs_, &normals_}) {
       if (!list->used) continue;
       lists.emplace_back(attributes.add(list->attribute, AttributeDomain::corner, list->components, false),
@@ -226,18 +210,14 @@ class ObjReader {
     if (lists.empty()) return;
     for (std::size_t corner = 0; corner < uvs_.corners.size(); ++corner) {
       attributes.begin(AttributeDomain::corner);
-      for (const auto& [attribute, list] : lists)
-        set_corner(attributes, attribute, *list, list->corners[corner]);
+      for (const auto& [column, list] : lists) {
+        const std::int64_t index = list->corners[corner];
+        if (index >= list->size()) attributes.spoil(column, wrong_index(*list, index + 1));
+        if (index == kNone || index >= list->size()) continue;
+        for (int i = 0; i < list->components; ++i)
+          attributes.set(column, i, list->values[static_cast<std::size_t>(index * list->components + i)]);
+      }
     }
-  }
-
-  void set_corner(AttributeBuilder& attributes, std::size_t attribute, const CornerList& list,
-                  std::int64_t index) {
-    if (index == kNone) return;
-    // Only now the length of the list is known.
-    if (index >= list.size()) return attributes.spoil(attribute, wrong_index(list, index + 1));
-    for (int i = 0; i < list.components; ++i)
-      attributes.set(attribute, i, list.values[static_cast<std::size_t>(index * list.components + i)]);
   }
 
   TextCursor cursor_;
@@ -245,7 +225,7 @@ class ObjReader {
   std::string_view bytes_;
   std::size_t left_out_ = 0;  ///< lines with other geometry than points and polygons
   std::vector<std::int64_t> corners_;
-  // Attributes, where they are asked for.
+  // For attributes.
   CornerList uvs_{"uv", "texture coordinate", 2}, normals_{"normal", "normal", 3};
   std::optional<std::size_t> colour_, material_attribute_;
   std::vector<std::string> materials_;

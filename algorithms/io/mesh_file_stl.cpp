@@ -1,7 +1,6 @@
 // STL (3D Systems 1988): triangles without shared points, as text or binary.
-#include <bit>
-
 #include "algorithms/io/mesh_file_formats.h"
+#include "algorithms/io/stored_number.h"
 
 namespace hermesh::mesh_formats {
 
@@ -11,14 +10,9 @@ namespace {
 // bytes of attributes, for each triangle.
 constexpr std::size_t header_size = 84, triangle_size = 50;
 
-std::uint32_t little_endian_word(const char* at) {
-  // Words lie at any address, so they are copied and not read in place.
-  std::uint32_t word;
-  std::memcpy(&word, at, sizeof word);
-  return std::endian::native == std::endian::big ? __builtin_bswap32(word) : word;
+std::uint64_t declared_triangles(std::string_view bytes) {
+  return stored_number<std::uint32_t>(bytes.data() + 80);
 }
-
-std::uint64_t declared_triangles(std::string_view bytes) { return little_endian_word(bytes.data() + 80); }
 
 class StlReader {
  public:
@@ -26,7 +20,6 @@ class StlReader {
       : bytes_(bytes), builder_(builder), merger_(builder.mesh.points) {}
 
   void read_binary() {
-    // The count is settled against the size of the file first, so the loop reads no byte beyond it.
     const std::uint64_t end = header_size + triangle_size * count_triangles();
     builder_.mesh.triangles.reserve((end - header_size) / triangle_size);
     for (std::size_t at = header_size; at < end; at += triangle_size) {
@@ -34,8 +27,7 @@ class StlReader {
       for (std::size_t i = 0; i < 3; ++i) {
         Eigen::Vector3d point;  // behind the normal, which is not used
         for (std::size_t k = 0; k < 3; ++k)
-          point[static_cast<int>(k)] =
-              std::bit_cast<float>(little_endian_word(bytes_.data() + at + 12 + 12 * i + 4 * k));
+          point[static_cast<int>(k)] = stored_number<float>(bytes_.data() + at + 12 + 12 * i + 4 * k);
         add_corner(point);
       }
       end_polygon();
@@ -50,8 +42,8 @@ class StlReader {
     for (skip_space(); !cursor.at_end(); skip_space()) {
       builder_.tick(cursor.offset(), bytes_.size());
       const std::size_t start = cursor.offset();
-      // Only "vertex" and "endloop" make polygons, and nothing but more corners may come between them; all
-      // other keywords are asked for to see where the file breaks off.
+      // Only "vertex" and "endloop" make polygons, with nothing but corners between them. The other keywords
+      // show if the file breaks off.
       const Keyword keyword = read_keyword(cursor);
       if (keyword == Keyword::vertex) {
         read_vertex(cursor);
@@ -60,14 +52,14 @@ class StlReader {
       } else if (!corners_.empty()) {
         cursor.fail_at(start, "a facet that does not end in 'endloop'");
       } else if (keyword == Keyword::none) {
-        // Some programs put colours between the facets. Elsewhere it could be a corner that is lost, or
-        // another file.
+        // Some programs put colours between the facets. Elsewhere it may be a damaged corner, or another
+        // file.
         if (solids_ == 0 || last_ == Keyword::outer || last_ == Keyword::end_solid)
           cursor.fail_at(start, "a word that is no keyword of an STL file");
         if (unknown_++ == 0) first_unknown_ = cursor.line_at(start);
         cursor.rest_of_line();
       } else if (keyword != Keyword::end_facet) {
-        cursor.rest_of_line();  // a name, or a normal, which is not used
+        cursor.rest_of_line();  // a name, or a normal
       }
       solids_ += keyword == Keyword::solid || keyword == Keyword::facet;
       last_ = keyword;
@@ -79,69 +71,60 @@ class StlReader {
  private:
   enum class Keyword { none, solid, facet, outer, vertex, end_loop, end_facet, end_solid };
 
-  /// Number of triangles of a binary file. If the size of the file is that of a whole number of triangles, it
-  /// decides: programs that write as they go leave a count of 0 or −1, and others count wrong.
+  /// Returns the number of triangles of a binary file. If the size of the file fits a whole number of
+  /// triangles, it decides: some programs leave a count of 0 or −1, or count wrong.
   std::uint64_t count_triangles() {
     if (bytes_.size() < header_size)
       builder_.fail("the file is truncated: an STL file has at least 84 bytes");
     const std::uint64_t declared = declared_triangles(bytes_),
                         whole = (bytes_.size() - header_size) / triangle_size;
     if (declared == whole && bytes_.size() == header_size + triangle_size * whole) return declared;
-    // The size speaks for another number of triangles than the count: that number is read, with a note.
     if (whole > 0 && bytes_.size() == header_size + triangle_size * whole) {
-      builder_.note("it declares " + std::to_string(declared) + " triangles but has the length of " +
-                    std::to_string(whole) + ", which were read; if there were more, it was cut off");
+      builder_.note("it declares ", declared, " triangles but has the length of ", whole,
+                    ", which were read; if there were more, it was cut off");
       return whole;
     }
     if (whole < declared)
-      builder_.fail("the file is truncated: it has " + std::to_string(bytes_.size()) +
-                    " bytes, but a binary STL file of its declared number of triangles has " +
-                    std::to_string(header_size + triangle_size * declared));
-    // What is longer than it declares, and by no whole number of triangles, may only be padded.
+      builder_.fail("the file is truncated: it has ", bytes_.size(),
+                    " bytes, but a binary STL file of its declared number of triangles has ",
+                    header_size + triangle_size * declared);
+    // The rest, no whole number of triangles, may only be padding.
     const std::string_view rest = bytes_.substr(header_size + triangle_size * declared);
     if (!without_padding(rest).empty())
-      builder_.fail("it declares " + std::to_string(declared) + " triangles, but " +
-                    std::to_string(rest.size()) +
+      builder_.fail("it declares ", declared, " triangles, but ", rest.size(),
                     " bytes follow, which are not a whole number of triangles; the file is damaged");
     builder_.note_padding(rest);
     return declared;
   }
 
-  /// A text that ends behind a facet may be cut off between two facets, which nobody can tell; one that ends
-  /// within a facet is refused.
+  /// Refuses a text that ends within a facet. One that ends behind a facet may be cut off, with a note.
   void check_end() {
     if (last_ != Keyword::end_solid && last_ != Keyword::end_facet)
       builder_.fail("the file is truncated: it does not end in 'endsolid'");
     if (last_ == Keyword::end_facet)
-      builder_.note("it does not end in 'endsolid'; if there was more than " + std::to_string(polygons_) +
+      builder_.note("it does not end in 'endsolid'; if there was more than ", polygons_,
                     " facets, it was cut off");
     if (unknown_ > 0)
-      builder_.note(std::to_string(unknown_) +
-                    " lines that do not belong into an STL file were passed over, the first is line " +
-                    std::to_string(first_unknown_));
+      builder_.note(unknown_, " lines that do not belong into an STL file were ignored, the first is line ",
+                    first_unknown_);
   }
 
-  static bool is(std::string_view word, std::string_view keyword) {
-    return std::equal(word.begin(), word.end(), keyword.begin(), keyword.end(),
-                      [](char a, char b) { return a == b || a == b - 'a' + 'A'; });
-  }
-
-  /// Reads a keyword, in letters of either case; "end loop" is written for "endloop", too.
+  /// Reads a keyword, in letters of either case; "end loop" counts as "endloop".
   static Keyword read_keyword(TextCursor& cursor) {
     constexpr std::pair<std::string_view, Keyword> keywords[] = {
         {"vertex", Keyword::vertex},     {"facet", Keyword::facet},        {"outer", Keyword::outer},
         {"endloop", Keyword::end_loop},  {"endfacet", Keyword::end_facet}, {"solid", Keyword::solid},
         {"endsolid", Keyword::end_solid}};
+    const auto is = [](std::string_view word, std::string_view name) {
+      return std::ranges::equal(word, name, [](char a, char b) { return a == b || a == b - 'a' + 'A'; });
+    };
     const std::string_view word = cursor.word();
+    const std::string_view end = is(word, "end") ? word : std::string_view();
+    if (!end.empty()) cursor.skip_blanks();
+    const std::string_view rest = end.empty() ? word : cursor.word();
     for (const auto& [name, keyword] : keywords)
-      if (is(word, name)) return keyword;
-    if (!is(word, "end")) return Keyword::none;
-    cursor.skip_blanks();
-    const std::string_view what = cursor.word();
-    return is(what, "loop")    ? Keyword::end_loop
-           : is(what, "facet") ? Keyword::end_facet
-           : is(what, "solid") ? Keyword::end_solid
-                               : Keyword::none;
+      if (end.empty() ? is(word, name) : name.starts_with("end") && is(rest, name.substr(3))) return keyword;
+    return Keyword::none;
   }
 
   void read_vertex(TextCursor& cursor) {
@@ -154,11 +137,9 @@ class StlReader {
   }
 
   void add_corner(const Eigen::Vector3d& point) {
-    // Before the point is merged, because NaN equals nothing.
     if (!point.allFinite())
-      builder_.fail("point " + std::to_string(corners_.size()) + " of triangle " + std::to_string(polygons_) +
+      builder_.fail("point ", corners_.size(), " of triangle ", polygons_,
                     " (both count from 0) has a coordinate that is not a finite number");
-    // STL repeats a point for each of its triangles; equal coordinates make them one again.
     corners_.push_back(merger_.add(point));
   }
 
@@ -183,8 +164,8 @@ bool is_binary_stl(std::string_view bytes) {
          bytes.size() == header_size + triangle_size * declared_triangles(bytes);
 }
 
-/// Reads an STL file of either kind. Binary files that begin with "solid" exist, so that word alone does not
-/// decide. Text has no zero byte but as padding, and the count of a binary file has one.
+/// Reads an STL file of either kind. Some binary files begin with "solid", too, but the count of a binary
+/// file has a zero byte, which text has only as padding.
 void read_stl(std::string_view bytes, MeshBuilder& builder) {
   const auto has_zero = [](std::string_view part) { return part.find('\0') != std::string_view::npos; };
   const bool text = !is_binary_stl(bytes) && !has_zero(without_padding(bytes).substr(0, 1000)) &&

@@ -1,5 +1,5 @@
-// The lexer that the text formats share: words, numbers and lines as programs really write them. Private to
-// algorithms/io/mesh_file*.cpp.
+// The lexer of the text formats: words, numbers and lines as programs really write them. Private to
+// algorithms/io.
 #pragma once
 
 #include <charconv>
@@ -13,44 +13,73 @@
 
 namespace hermesh::mesh_formats {
 
-/// The text in quotation marks, for sentences.
-inline std::string in_quotes(std::string_view text) {
-  std::string result = "'";
-  result += text;
-  return result += "'";
-}
-/// A word of a file for a sentence: in quotation marks, short, with '?' for all that is not printable ASCII,
-/// so that no file can write to the terminal.
+inline std::string in_quotes(std::string_view text) { return "'" + std::string(text) + "'"; }
+/// Returns a word of a file for a message: in quotation marks, short, with '?' for all that is not printable
+/// ASCII, so that no file can control the terminal.
 std::string quoted_word(std::string_view word);
-/// The name with '?' in place of control characters, cut to 100 bytes.
+/// Returns the name with '?' in place of control characters, cut to 100 bytes.
 std::string clean_name(std::string_view name);
+inline std::string lower_case(std::string text) {
+  for (char& c : text)
+    if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
+  return text;
+}
+
+/// Concatenates texts and numbers.
+template <class... Parts>
+std::string joined(const Parts&... parts) {
+  std::string text;
+  const auto append = [&](const auto& part) {
+    if constexpr (std::is_arithmetic_v<std::remove_cvref_t<decltype(part)>>)
+      text += std::to_string(part);
+    else
+      text += part;
+  };
+  (append(parts), ...);
+  return text;
+}
+
+/// Text of a number: the shortest that reads back as the same number, or as to_chars() formats it.
+class NumberText {
+ public:
+  template <class... Arguments>
+  explicit NumberText(Arguments... arguments)
+      : end_(std::to_chars(digits_, digits_ + sizeof digits_, arguments...).ptr) {}
+  NumberText(const NumberText&) = delete;
+  NumberText& operator=(const NumberText&) = delete;
+  operator std::string_view() const { return {digits_, end_}; }
+
+ private:
+  char digits_[32];
+  const char* end_;
+};
+/// Returns the number with three significant digits, for messages.
+inline std::string three_digits(double value) {
+  return std::string(std::string_view(NumberText(value, std::chars_format::general, 3)));
+}
 
 inline bool is_line_end(char c) { return c == '\n' || c == '\r'; }
 inline bool is_blank(char c) { return c == ' ' || c == '\t' || c == '\v' || c == '\f'; }
-inline bool is_space(char c) { return c == ' ' || (c >= '\t' && c <= '\r'); }  // both of these
-/// What may follow the data of a file without being data: white space, zeros up to the end of a block, and
-/// Ctrl-Z, with which CP/M and DOS end a text.
-inline bool is_padding(char c) { return is_space(c) || c == '\0' || c == '\x1a'; }
+inline bool is_space(char c) { return c == ' ' || (c >= '\t' && c <= '\r'); }
 
-/// The text without the padding at its end.
+/// Returns the text without the padding that may follow the data of a file: white space, zeros up to the end
+/// of a block, and Ctrl-Z, with which CP/M and DOS end a text.
 inline std::string_view without_padding(std::string_view text) {
-  while (!text.empty() && is_padding(text.back())) text.remove_suffix(1);
+  while (!text.empty() && (is_space(text.back()) || text.back() == '\0' || text.back() == '\x1a'))
+    text.remove_suffix(1);
   return text;
 }
-/// Whether the padding at the end of the text is more than white space.
-bool has_odd_padding(std::string_view text);
-/// The text without the byte order mark that some editors put before UTF-8.
+/// Returns the text without the byte order mark that some editors put before UTF-8.
 inline std::string_view without_byte_order_mark(std::string_view text) {
   if (text.starts_with("\xEF\xBB\xBF")) text.remove_prefix(3);
   return text;
 }
 
-/// Reads text from front to back; independent of the locale. Lines end in "\n", "\r\n" or "\r", mixed as they
-/// come. The text ends before the padding at its end. Complaints name the line.
+/// Reads text from front to back, independent of the locale, up to its padding. Lines end in "\n", "\r\n" or
+/// "\r", even mixed. Errors name the line.
 class TextCursor {
  public:
-  /// `comment` and `continuation` are characters that end a number as white space does, where the format has
-  /// them.
+  /// `comment` and `continuation` are characters of the format that end a number like white space.
   TextCursor(std::string_view text, std::string file, std::size_t start = 0, char comment = '\n',
              char continuation = '\n')
       : begin_(text.data()),
@@ -64,7 +93,7 @@ class TextCursor {
 
   bool at_end() const { return at_ == end_; }
   bool at_line_end() const { return at_ == end_ || is_line_end(*at_); }
-  /// Whether a number may end here.
+  /// True if a number may end here.
   bool ends_word() const {
     return at_ == end_ || is_space(*at_) || *at_ == comment_ || *at_ == continuation_;
   }
@@ -79,8 +108,8 @@ class TextCursor {
   void skip_blanks() {
     while (at_ != end_ && is_blank(*at_)) ++at_;
   }
-  /// Passes over blanks and tells whether the line goes on behind them. For the innermost loops: mostly one
-  /// blank, then a word.
+  /// Skips blanks and returns true if a word follows on the line. For the innermost loops: mostly one blank,
+  /// then a word.
   [[gnu::always_inline]] bool skip_blanks_to_word() {
     for (; at_ != end_; ++at_) {
       if (*at_ > ' ') return true;
@@ -93,8 +122,7 @@ class TextCursor {
   void skip_word() {
     while (at_ != end_ && !is_space(*at_)) ++at_;
   }
-  /// Passes over white space, and over comments from `#` to the end of the line, whose text goes to
-  /// `comment`.
+  /// Skips white space, and comments from `#` to the end of the line, with whose text it calls `comment`.
   template <class Comment>
   void skip_to_word(Comment&& comment) {
     for (skip_space(); peek() == '#'; skip_space()) {
@@ -102,7 +130,7 @@ class TextCursor {
       comment(rest_of_line());
     }
   }
-  /// Passes over blanks, and over line ends behind a character that continues the line on the next one.
+  /// Skips blanks, and line ends behind the continuation character.
   void skip_blanks_and_continuations() {
     for (skip_blanks(); at_ != end_ && *at_ == continuation_; skip_blanks()) {
       const char* const start = at_++;
@@ -119,12 +147,12 @@ class TextCursor {
     skip_word();
     return {start, static_cast<std::size_t>(at_ - start)};
   }
-  /// Moves behind the end of the line, if the cursor stands before it.
+  /// Skips the end of the line, if the cursor is there.
   void skip_line_end() {
     if (at_ != end_ && *at_ == '\r') ++at_;
     if (at_ != end_ && *at_ == '\n') ++at_;
   }
-  /// What is left of the line, without its end and the blanks before that; the cursor moves behind it.
+  /// Returns the rest of the line without trailing blanks and its end, which the cursor skips.
   std::string_view rest_of_line() {
     const char* const start = at_;
     if (at_ == end_ || *at_ != '\n') at_ = end_of_line();
@@ -134,15 +162,15 @@ class TextCursor {
     return {start, static_cast<std::size_t>(stop - start)};
   }
 
-  /// The number that starts here; what ends it is not looked at.
+  /// Reads the number that starts here, followed by anything.
   template <class T>
   [[gnu::always_inline]] T leading_number(const char* what) {
     T value{};
     if (!take(value)) fail_number(what);
     return value;
   }
-  /// The number that starts here, if there is one and a slash or the end of the word follows. All up to these
-  /// is passed over in any case.
+  /// Reads the number that starts here, if there is one and a slash or the end of the word follows. Skips all
+  /// up to these in any case.
   template <class T>
   std::optional<T> leading_number_if_any() {
     T value{};
@@ -150,34 +178,35 @@ class TextCursor {
     while (peek() != '/' && !ends_word()) ++at_;
     return good ? std::optional(value) : std::nullopt;
   }
-  /// The number that is the next word. Inlined by order: a seventh of the time that text takes.
+  /// Reads the number that is the next word. Inlining saves a seventh of the time of reading text.
   template <class T>
   [[gnu::always_inline]] T number(const char* what) {
     const char* const start = at_;
     T value{};
-    if (!take(value) || !(at_ == end_ || is_space(*at_) || take_odd_end(value))) {
+    if (!take_word(value)) {
       at_ = start;
       fail_number(what);
     }
     return value;
   }
-  /// The number that is the next word, or nothing if that is something else, which is passed over. There must
-  /// be a word.
+  /// Reads the next word, which must exist, and returns it if it is a number.
   template <class T>
   std::optional<T> number_if_any() {
     const char* const start = at_;
     T value{};
-    if (take(value) && (at_ == end_ || is_space(*at_) || take_odd_end(value))) return value;
+    if (take_word(value)) return value;
     at_ = start + 1;
     while (!ends_word()) ++at_;
     return std::nullopt;
   }
 
-  [[noreturn]] void fail(const std::string& what) const { fail_at(offset(), what); }
-  /// @throws Error that names the line of `offset`, the place that is complained about.
+  template <class... Parts>
+  [[noreturn]] void fail(const Parts&... what) const {
+    fail_at(offset(), joined(what...));
+  }
+  /// @throws Error that names the line of `offset`.
   [[noreturn]] void fail_at(std::size_t offset, const std::string& what) const;
-  /// Number of the line at `offset`, counting from 1. It looks at all lines before, so it is for complaints
-  /// only.
+  /// Returns the number of the line at `offset`, counting from 1. Slow: it scans all lines before.
   std::size_t line_at(std::size_t offset) const;
 
  private:
@@ -187,8 +216,7 @@ class TextCursor {
     if (start != end_ && *start == '+') ++start;
     auto [stop, status] = std::from_chars(start, end_, value);
     if constexpr (std::is_floating_point_v<T>) {
-      // Too large and too small look the same here; long double tells them apart, and its overflow is
-      // infinity.
+      // Too large and too small numbers give the same status. A long double distinguishes them.
       long double wide = HUGE_VALL;
       if (status == std::errc::result_out_of_range) {
         std::from_chars(start, end_, wide);
@@ -200,9 +228,12 @@ class TextCursor {
     at_ = stop;
     return true;
   }
-  /// Whether what stands behind a number ends it although it is no space: another character that may end a
-  /// word, or the rest of a name that old C libraries of Windows give to what is not finite, such as
-  /// `1.#IND`.
+  template <class T>
+  [[gnu::always_inline]] bool take_word(T& value) {
+    return take(value) && (at_ == end_ || is_space(*at_) || take_odd_end(value));
+  }
+  /// True if the number ends here although no space follows: at another character that ends a word, or behind
+  /// a name of old C libraries of Windows for a number that is not finite, such as `1.#IND`.
   template <class T>
   [[gnu::noinline]] bool take_odd_end(T& value) {
     if constexpr (std::is_floating_point_v<T>)
@@ -213,8 +244,8 @@ class TextCursor {
     return ends_word();
   }
   std::optional<double> take_windows_name(bool negative);
-  /// End of the line that the cursor is in. The next "\n" is remembered, or each line of a text without any
-  /// would be searched to the end of the text.
+  /// Returns the end of the current line. Caches the next "\n", or each line of a text without any would be
+  /// searched to the end of the text.
   const char* end_of_line() {
     if (!newline_ || newline_ < at_) {
       const void* const found = std::memchr(at_, '\n', remaining());

@@ -1,14 +1,14 @@
-// The writers of mesh_file.h.
+// Writers of mesh files.
 #include <zlib.h>
 
 #include <Eigen/Geometry>
-#include <bit>
+#include <algorithm>
 #include <cerrno>
 
 #include "algorithms/io/atomic_file.h"
 #include "algorithms/io/mesh_file_formats.h"
-#include "algorithms/io/mesh_units.h"
 #include "algorithms/io/scenes/scene_files.h"
+#include "algorithms/io/stored_number.h"
 
 namespace hermesh {
 
@@ -16,8 +16,8 @@ namespace {
 
 using namespace mesh_formats;
 
-/// Collects bytes and hands them to zlib, which passes them through where the file is not compressed. A full
-/// disk shows in any of its calls, the last one included.
+/// Buffers bytes for zlib, which writes them with or without compression. Each of its calls may find the disk
+/// full, even the last one.
 class Output {
  public:
   Output(const std::filesystem::path& temporary, const std::filesystem::path& target, bool gzipped,
@@ -39,23 +39,14 @@ class Output {
     buffer_.append(text);
     if (buffer_.size() >= capacity) flush();
   }
-  /// Writes a number little-endian, whatever the machine.
   template <class T>
   void binary(T value) {
-    std::array<char, sizeof(T)> bytes = std::bit_cast<std::array<char, sizeof(T)>>(value);
-    if constexpr (std::endian::native == std::endian::big) std::reverse(bytes.begin(), bytes.end());
+    const auto bytes = bytes_of_number(value);
     text({bytes.data(), bytes.size()});
-  }
-  /// Writes the shortest text that reads back as the same number.
-  template <class T>
-  void number(T value) {
-    char digits[32];
-    text({digits, std::to_chars(digits, digits + sizeof digits, value).ptr});
   }
   void close() {
     flush();
-    // The last bytes go out only here, and a disk may be full of them. The destructor must not close the file
-    // a second time, even after an Error.
+    // The destructor must not close the file a second time, even after an Error.
     const gzFile file = std::exchange(file_, nullptr);
     errno = 0;
     if (gzclose(file) != Z_OK) fail();
@@ -65,7 +56,6 @@ class Output {
   static constexpr std::size_t capacity = 1 << 20;
 
   void flush() {
-    // Once a megabyte: a cancelled run ends before the file is whole, and AtomicFile removes what there is.
     context_.check();
     errno = 0;
     if (!buffer_.empty() && gzwrite(file_, buffer_.data(), static_cast<unsigned>(buffer_.size())) <= 0)
@@ -73,8 +63,8 @@ class Output {
     buffer_.clear();
   }
   [[noreturn]] void fail() const {
-    throw Error("cannot write " + in_quotes(target_) +
-                (errno ? std::string(": ") + std::strerror(errno) : ""));
+    throw Error(
+        joined("cannot write ", in_quotes(target_), (errno ? std::string(": ") + std::strerror(errno) : "")));
   }
 
   std::string target_;
@@ -87,12 +77,12 @@ void write_numbers(Output& out, std::string_view lead, const Eigen::Vector3d& nu
   out.text(lead);
   for (const double x : numbers) {
     out.text(" ");
-    out.number(x);
+    out.text(NumberText(x));
   }
   out.text("\n");
 }
 
-/// The nearest point in single precision. Volatile because GCC 12 drops the rounding from a vector's
+/// Returns the nearest point in single precision. Volatile because GCC 12 drops the rounding from a vector's
 /// `.cast<float>().cast<double>()` when it vectorizes straight-line code.
 Eigen::Vector3d rounded_to_single(const Eigen::Vector3d& point) {
   volatile float x = static_cast<float>(point.x()), y = static_cast<float>(point.y()),
@@ -100,18 +90,11 @@ Eigen::Vector3d rounded_to_single(const Eigen::Vector3d& point) {
   return {x, y, z};
 }
 
-bool fits_single_precision(const MeshFile& mesh) {
-  for (const Eigen::Vector3d& point : mesh.points)
-    if (point != rounded_to_single(point)) return false;
-  return true;
-}
-
-/// An attribute of points as PLY's properties, by the names under which read_mesh_file() finds it again.
-/// Colours become bytes, which is what other programs read.
+/// An attribute as PLY's properties, by the names under which read_mesh_file() finds it again.
 struct PlyAttribute {
   const MeshAttribute& attribute;
   std::vector<std::string> properties;
-  bool bytes = false;
+  bool bytes = false;  ///< for colours, as other programs expect them
 };
 
 std::vector<std::string> ply_properties(const MeshAttribute& attribute) {
@@ -122,7 +105,6 @@ std::vector<std::string> ply_properties(const MeshAttribute& attribute) {
   if (is("normal", 3, 3)) names = {"nx", "ny", "nz"};
   if (is("colour", 3, 4)) names = {"red", "green", "blue", "alpha"};
   if (is("uv", 2, 2)) names = {"u", "v"};
-  // Names that readers know; all others are made of the attribute's own.
   names.resize(static_cast<std::size_t>(attribute.components));
   for (std::size_t i = 0; i < names.size(); ++i) {
     if (!names[i].empty()) continue;
@@ -133,8 +115,7 @@ std::vector<std::string> ply_properties(const MeshAttribute& attribute) {
   return names;
 }
 
-/// The attributes of a file by the element that they are properties of. For corners, PLY as others read it
-/// has a place for texture coordinates alone.
+/// The attributes of a file by element. For corners, other programs read texture coordinates only.
 struct PlyAttributes {
   std::vector<PlyAttribute> points, polygons;
   const MeshAttribute* corner_uv = nullptr;
@@ -147,17 +128,16 @@ PlyAttributes ply_attributes(const MeshFile& mesh, const std::string& file, RunC
                                                3 * mesh.triangles.size() + 4 * mesh.quads.size(), polygons};
   for (const MeshAttribute& attribute : mesh.attributes) {
     const std::size_t values = std::visit([](const auto& all) { return all.size(); }, attribute.values);
-    // An attribute that was not carried along with a change of the mesh has a wrong length; its values would
-    // go to the wrong elements.
+    // A wrong length means that the mesh has changed without the attribute.
     const bool fits = values == elements[static_cast<std::size_t>(attribute.domain)] *
                                     static_cast<std::size_t>(attribute.components);
     const bool uv = attribute.name == "uv" && attribute.components == 2 && attribute.values.index() == 0;
     if (!fits || (attribute.domain == AttributeDomain::corner && !uv)) {
-      context.note(in_quotes(file) + ": a PLY has no place for the attribute " + attribute.name +
-                   ", which was left out");
+      context.note(joined(in_quotes(file), ": a PLY cannot store the attribute ", attribute.name,
+                          ", which was left out"));
       continue;
     }
-    // Only colours as floats from 0 to 1 become bytes; whole numbers are written as they are.
+    // Only colours as floats from 0 to 1 become bytes.
     const bool bytes =
         attribute.name == "colour" && attribute.components >= 3 && attribute.values.index() == 0;
     if (attribute.domain == AttributeDomain::corner)
@@ -193,9 +173,17 @@ void write_ply_values(Output& out, const std::vector<PlyAttribute>& attributes, 
       write_ply_value(out, each, element * each.properties.size() + j);
 }
 
+/// Calls `work` with each triangle, then each quad, the order of attributes of polygons and corners.
+template <class Work>
+void for_each_polygon(const MeshFile& mesh, Work&& work) {
+  for (const Triangle& triangle : mesh.triangles) work(triangle);
+  for (const Quad& quad : mesh.quads) work(quad);
+}
+
 void write_ply(Output& out, const MeshFile& mesh, const PlyAttributes& attributes) {
-  // One type for all points of the file: single precision only if no point loses a bit.
-  const bool single = fits_single_precision(mesh);
+  // Single precision for all points, if no point loses a bit.
+  const bool single = std::ranges::all_of(
+      mesh.points, [](const Eigen::Vector3d& point) { return point == rounded_to_single(point); });
   const std::string type = single ? "float" : "double";
   out.text("ply\nformat binary_little_endian 1.0\n");
   if (mesh.origin) write_numbers(out, "comment origin", *mesh.origin);
@@ -203,7 +191,7 @@ void write_ply(Output& out, const MeshFile& mesh, const PlyAttributes& attribute
   for (const char* axis : {" x\n", " y\n", " z\n"}) out.text("property " + type + axis);
   declare_ply_properties(out, attributes.points);
   out.text("element face " + std::to_string(mesh.triangles.size() + mesh.quads.size()) + "\n");
-  // Most programs know signed indices only.
+  // Most programs read signed indices only.
   out.text(mesh.points.size() <= 0x7fffffff ? "property list uchar int vertex_indices\n"
                                             : "property list uchar uint vertex_indices\n");
   declare_ply_properties(out, attributes.polygons);
@@ -213,41 +201,32 @@ void write_ply(Output& out, const MeshFile& mesh, const PlyAttributes& attribute
     for (const double x : mesh.points[i]) single ? out.binary(static_cast<float>(x)) : out.binary(x);
     write_ply_values(out, attributes.points, i);
   }
-  // Triangles first, then quads, in the order that the attributes of polygons and corners have in memory.
   std::size_t number = 0, uv = 0;
-  const auto write_polygons = [&](const auto& polygons) {
-    for (const auto& polygon : polygons) {
-      out.binary(static_cast<std::uint8_t>(polygon.size()));
-      for (const std::uint32_t corner : polygon) out.binary(corner);
-      write_ply_values(out, attributes.polygons, number++);
-      if (!attributes.corner_uv) continue;
-      out.binary(static_cast<std::uint8_t>(2 * polygon.size()));
-      for (std::size_t i = 0; i < 2 * polygon.size(); ++i)
-        out.binary(std::get<0>(attributes.corner_uv->values)[uv++]);
-    }
-  };
-  write_polygons(mesh.triangles);
-  write_polygons(mesh.quads);
+  for_each_polygon(mesh, [&](const auto& polygon) {
+    out.binary(static_cast<std::uint8_t>(polygon.size()));
+    for (const std::uint32_t corner : polygon) out.binary(corner);
+    write_ply_values(out, attributes.polygons, number++);
+    if (!attributes.corner_uv) return;
+    out.binary(static_cast<std::uint8_t>(2 * polygon.size()));
+    for (std::size_t i = 0; i < 2 * polygon.size(); ++i)
+      out.binary(std::get<0>(attributes.corner_uv->values)[uv++]);
+  });
 }
 
-/// Text is read in double precision, so it is written in double precision: the few digits that would identify
-/// a float among floats are another double.
+// Text is read in double precision, so points are written as doubles: the few digits that identify a float
+// are another double.
+
 void write_obj(Output& out, const MeshFile& mesh) {
   if (mesh.origin) write_numbers(out, "# origin", *mesh.origin);
   for (const Eigen::Vector3d& point : mesh.points) write_numbers(out, "v", point);
-  const auto write_polygons = [&](const auto& polygons) {
-    for (const auto& polygon : polygons) {
-      out.text("f");
-      for (const std::uint32_t corner : polygon) {
-        out.text(" ");
-        // In 64 bits, since OBJ counts from 1 and the last index would overflow 32.
-        out.number(std::uint64_t(corner) + 1);
-      }
-      out.text("\n");
+  for_each_polygon(mesh, [&](const auto& polygon) {
+    out.text("f");
+    for (const std::uint32_t corner : polygon) {
+      out.text(" ");
+      out.text(NumberText(std::uint64_t(corner) + 1));  // OBJ counts from 1
     }
-  };
-  write_polygons(mesh.triangles);
-  write_polygons(mesh.quads);
+    out.text("\n");
+  });
 }
 
 void write_off(Output& out, const MeshFile& mesh) {
@@ -255,125 +234,94 @@ void write_off(Output& out, const MeshFile& mesh) {
   if (mesh.origin) write_numbers(out, "# origin", *mesh.origin);
   out.text(std::to_string(mesh.points.size()) + " " +
            std::to_string(mesh.triangles.size() + mesh.quads.size()) + " 0\n");
-  for (const Eigen::Vector3d& point : mesh.points) {
+  for (const Eigen::Vector3d& point : mesh.points)
     for (int axis = 0; axis < 3; ++axis) {
-      out.number(point[axis]);
+      out.text(NumberText(point[axis]));
       out.text(axis < 2 ? " " : "\n");
     }
-  }
-  const auto write_polygons = [&](const auto& polygons) {
-    for (const auto& polygon : polygons) {
-      out.number(polygon.size());
-      for (const std::uint32_t corner : polygon) {
-        out.text(" ");
-        out.number(corner);
-      }
-      out.text("\n");
+  for_each_polygon(mesh, [&](const auto& polygon) {
+    out.text(NumberText(polygon.size()));
+    for (const std::uint32_t corner : polygon) {
+      out.text(" ");
+      out.text(NumberText(corner));
     }
-  };
-  write_polygons(mesh.triangles);
-  write_polygons(mesh.quads);
+    out.text("\n");
+  });
 }
 
-std::vector<bool> used_points(const MeshFile& mesh) {
-  // STL has no list of points: what no triangle uses is lost.
-  std::vector<bool> used(mesh.points.size(), false);
-  for (const Triangle& triangle : mesh.triangles)
-    for (const std::uint32_t corner : triangle) used[corner] = true;
-  for (const Quad& quad : mesh.quads)
-    for (const std::uint32_t corner : quad) used[corner] = true;
-  return used;
-}
-
-/// Says what STL cannot hold of this mesh.
+/// Adds notes about the parts of this mesh that STL cannot store.
 void note_losses_of_stl(const std::string& name, const MeshFile& mesh, RunContext& context) {
-  const std::vector<bool> used = used_points(mesh);
+  std::vector<bool> used(mesh.points.size(), false);
+  for_each_polygon(mesh, [&](const auto& polygon) {
+    for (const std::uint32_t corner : polygon) used[corner] = true;
+  });
   std::size_t unused = 0, moved = 0;
   double largest_shift = 0.0;
-  // Points that become equal are counted by merging twice, before and after rounding, as a reader of STL
-  // merges them.
+  // Counts points that become equal by merging before and after rounding, as a reader of STL merges them.
   std::vector<Eigen::Vector3d> before, after;
   PointMerger merge_before(before), merge_after(after);
   for (std::size_t i = 0; i < mesh.points.size(); ++i) {
     unused += !used[i];
     if (!used[i]) continue;
     const Eigen::Vector3d rounded = rounded_to_single(mesh.points[i]);
-    // Refused before a byte is written.
     if (!rounded.allFinite())
-      throw Error("cannot write " + in_quotes(name) + ": a coordinate is too large for STL");
+      throw Error(joined("cannot write ", in_quotes(name), ": a coordinate is too large for STL"));
     moved += rounded != mesh.points[i];
     largest_shift = std::max(largest_shift, (rounded - mesh.points[i]).norm());
     merge_before.add(mesh.points[i]);
     merge_after.add(rounded);
   }
-  // Two losses, of places and of points; both notes are about the file and not about the work.
-  if (moved > 0) {
-    char shift[32];
-    const std::string_view shift_text(
-        shift, std::to_chars(shift, shift + sizeof shift, largest_shift, std::chars_format::general, 3).ptr);
-    context.note(in_quotes(name) + ": STL has single precision only: " + std::to_string(moved) +
-                 " points moved, by at most " + std::string(shift_text) + ", and " +
-                 std::to_string(before.size() - after.size()) + " became equal to another");
-  }
+  if (moved > 0)
+    context.note(joined(in_quotes(name), ": STL has single precision only: ", moved,
+                        " points moved, by at most ", three_digits(largest_shift), ", and ",
+                        before.size() - after.size(), " became equal to another"));
   if (unused > 0)
-    context.note(in_quotes(name) + ": STL holds triangles only: " + std::to_string(unused) +
-                 " points that no polygon uses were left out");
+    context.note(joined(in_quotes(name), ": STL holds triangles only: ", unused,
+                        " points that no polygon uses were left out"));
 }
 
 void write_stl_triangle(Output& out, const std::array<Eigen::Vector3d, 3>& corners) {
-  // The normal is that of the rounded corners, which is what a reader of the file sees; a triangle without an
-  // area has none, and 0 says so.
+  // The normal of the rounded corners, or 0 for a triangle without an area.
   const Eigen::Vector3d across = (corners[1] - corners[0]).cross(corners[2] - corners[0]);
   const double length = across.norm();
   const bool degenerate = !(length > 0.0 && std::isfinite(length));
   for (const double x : across) out.binary(degenerate ? 0.0f : static_cast<float>(x / length));
   for (const Eigen::Vector3d& corner : corners)
     for (const double x : corner) out.binary(static_cast<float>(x));
-  // The attribute bytes, which have no agreed meaning.
-  out.binary(std::uint16_t(0));
+  out.binary(std::uint16_t(0));  // attribute bytes without a standard meaning
 }
 
 void write_stl(Output& out, const MeshFile& mesh) {
   if (mesh.triangle_count() > 0xffffffff) throw Error("an STL file cannot hold more than 2^32 triangles");
-  // Not "solid", by which readers would take it for text.
+  // Not "solid", which readers take for text.
   std::string header = "binary STL";
   header.resize(80, ' ');
   out.text(header);
   out.binary(static_cast<std::uint32_t>(mesh.triangle_count()));
-  const auto write = [&](std::uint32_t a, std::uint32_t b, std::uint32_t c) {
-    write_stl_triangle(out, {rounded_to_single(mesh.points[a]), rounded_to_single(mesh.points[b]),
-                             rounded_to_single(mesh.points[c])});
-  };
-  for (const auto& [a, b, c] : mesh.triangles) write(a, b, c);
-  for (const auto& [a, b, c, d] : mesh.quads) {
-    write(a, b, c);
-    write(a, c, d);
-  }
+  for_each_triangle(
+      mesh, [&](auto... corners) { write_stl_triangle(out, {rounded_to_single(mesh.points[corners])...}); });
 }
 
-void check_mesh(const std::string& name, const MeshFile& mesh) {
-  for (std::size_t i = 0; i < mesh.points.size(); ++i)
-    if (!mesh.points[i].allFinite())
-      throw Error("cannot write " + in_quotes(name) + ": point " + std::to_string(i) + " is not finite");
-}
-
-/// Writes a mesh whose coordinates are in a unit of 3MF's.
+/// Writes a mesh; `unit` is 3MF's word for the unit of its coordinates.
 void write_in_unit(const std::filesystem::path& path, const PolygonMesh& mesh, std::string_view unit,
                    RunContext& context) {
   const Stage stage(context, "write");
+  const std::string name = path.string();
   const std::optional<MeshPath> named = parse_mesh_path(path);
   if (!named) throw_unknown_extension(path);
-  // What is wrong with the coordinates is found before there is a file.
+  // Coordinates are checked before there is a file.
   const MeshFile file = to_mesh_file(mesh);
-  check_mesh(path.string(), file);
-  if (named->format == Format::stl) note_losses_of_stl(path.string(), file, context);
-  // In this order: the stream is closed before its file is removed, should an Error end this.
-  AtomicFile aside(path);
-  Output out(aside.path(), path, named->gzipped, context);
+  for (std::size_t i = 0; i < file.points.size(); ++i)
+    if (!file.points[i].allFinite())
+      throw Error(joined("cannot write ", in_quotes(name), ": point ", i, " is not finite"));
+  if (named->format == Format::stl) note_losses_of_stl(name, file, context);
+  // In this order, so that an Error closes the stream before it removes the file.
+  AtomicFile temporary(path);
+  Output out(temporary.path(), path, named->gzipped, context);
   const ByteSink sink = [&out](std::string_view bytes) { out.text(bytes); };
   switch (named->format) {
     case Format::ply:
-      write_ply(out, file, ply_attributes(file, path.string(), context));
+      write_ply(out, file, ply_attributes(file, name, context));
       break;
     case Format::obj:
       write_obj(out, file);
@@ -386,15 +334,14 @@ void write_in_unit(const std::filesystem::path& path, const PolygonMesh& mesh, s
       break;
     case Format::glb:
     case Format::gltf:
-      write_gltf(sink, mesh, named->format == Format::glb, path.string());
+      write_gltf(sink, mesh, named->format == Format::glb, name);
       break;
     case Format::three_mf:
-      write_three_mf(sink, mesh, unit, path.string(), context);
+      write_three_mf(sink, mesh, unit, name, context);
       break;
   }
-  // A rename only after the last byte was taken without complaint.
   out.close();
-  aside.commit();
+  temporary.commit();
 }
 
 }  // namespace

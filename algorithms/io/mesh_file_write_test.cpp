@@ -7,7 +7,7 @@
 #include "algorithms/io/test_mesh_files.h"
 
 namespace hermesh {
-namespace {
+namespace mesh_file_write_test {
 
 namespace fs = std::filesystem;
 
@@ -49,8 +49,8 @@ TEST_F(MeshFileWriteTest, PlyIsSinglePrecisionWhereThatLosesNothing) {
   const PolygonMesh near = random_mesh(1, {0, 0, 0}), far = random_mesh(1, {1e6, 1e6, 1e6});
   write_mesh(folder / "near.ply", near, context);
   write_mesh(folder / "far.ply", far, context);
-  EXPECT_NE(bytes_of(folder / "near.ply").find("property float x"), std::string::npos);
-  EXPECT_NE(bytes_of(folder / "far.ply").find("property double x"), std::string::npos);
+  expect_words(bytes_of(folder / "near.ply"), "property float x");
+  expect_words(bytes_of(folder / "far.ply"), "property double x");
 }
 
 TEST_F(MeshFileWriteTest, StlRoundTripKeepsSinglePrecisionPoints) {
@@ -73,18 +73,17 @@ TEST_F(MeshFileWriteTest, StlSaysWhatItLoses) {
   mesh.quads = {{0, 1, 2, 3}};
   write_mesh(folder / "a.stl", mesh, context);
   ASSERT_EQ(context.notes.size(), 2u) << context.notes[0];
-  EXPECT_NE(context.notes[0].find("1 points moved, by at most 0.001, and 1 became equal"), std::string::npos)
-      << context.notes[0];
-  EXPECT_NE(context.notes[1].find("1 points that no polygon uses"), std::string::npos) << context.notes[1];
+  expect_words(context.notes[0], "1 points moved, by at most 0.001, and 1 became equal");
+  expect_words(context.notes[1], "1 points that no polygon uses");
 }
 
 TEST_F(MeshFileWriteTest, WritingFailsWithASentenceAndLeavesNothingBehind) {
   PolygonMesh mesh = random_mesh(1, {0, 0, 0}, 20);
-  EXPECT_NE(write_error_to(folder / "a.xyz", mesh).find("unknown type"), std::string::npos);
-  EXPECT_NE(write_error_to(folder / "none" / "a.ply", mesh).find("cannot write"), std::string::npos);
-  EXPECT_NE(write_error_to("/dev/null/a.ply", mesh).find("cannot write"), std::string::npos);
+  expect_words(write_error_to(folder / "a.xyz", mesh), "unknown type");
+  expect_words(write_error_to(folder / "none" / "a.ply", mesh), "cannot write");
+  expect_words(write_error_to("/dev/null/a.ply", mesh), "cannot write");
   mesh.points[3].y() = std::numeric_limits<float>::infinity();
-  EXPECT_NE(write_error_to(folder / "a.ply", mesh).find("point 3 is not finite"), std::string::npos);
+  expect_words(write_error_to(folder / "a.ply", mesh), "point 3 is not finite");
   fs::create_directory(folder / "sub.ply");
   EXPECT_NE(write_error_to(folder / "sub.ply", mesh), "");
   EXPECT_EQ(files(), std::vector<std::string>{"sub.ply"});
@@ -103,11 +102,11 @@ TEST_F(MeshFileWriteTest, AFullDiskIsAnErrorAndKeepsTheOldFile) {
   const std::string plain = write_error_to(folder / "a.ply", mesh);
   const std::string packed = write_error_to(folder / "a.off.gz", mesh);
   setrlimit(RLIMIT_FSIZE, &unlimited);
-  EXPECT_NE(plain.find("cannot write"), std::string::npos);
-  EXPECT_NE(packed.find("cannot write"), std::string::npos);
+  expect_words(plain, "cannot write");
+  expect_words(packed, "cannot write");
   EXPECT_EQ(bytes_of(folder / "a.ply"), "old");
   EXPECT_EQ(files().size(), 2u);
 }
 
-}  // namespace
+}  // namespace mesh_file_write_test
 }  // namespace hermesh

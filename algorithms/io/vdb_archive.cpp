@@ -16,8 +16,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Refuses what is no .vdb file. OpenVDB reports a missing file and one of another kind in the same words;
-/// these are ours.
+/// @throws Error if the file is missing or no .vdb file, which OpenVDB does not distinguish.
 void check_is_vdb(const fs::path& path) {
   std::error_code ignored;
   if (!fs::exists(path, ignored)) throw Error(path.string() + " does not exist");
@@ -33,10 +32,9 @@ void check_is_vdb(const fs::path& path) {
   if (magic != kMagic) throw Error(path.string() + " is not a .vdb file");
 }
 
-// A file that write_grids() made ends with eight bytes that say so and the CRC-32 of all before them, for
-// OpenVDB reads damaged data beyond the ends of its buffers (bloscFromStream() of version 10 compares lengths
-// after it has read). Other programs ignore what stands behind the last grid; a file that one of them has
-// written anew has neither this nor the metadata that announce it.
+// A file of write_grids() ends with eight bytes as a mark and the CRC-32 of all before them, since OpenVDB
+// does not detect all damage. Other programs ignore data behind the last grid; a file that one of them has
+// rewritten has neither this seal nor the metadata that announce it.
 constexpr std::array<char, 8> kSeal = {'h', 'e', 'r', 'm', 'e', 's', 'h', '\n'};
 constexpr std::uintmax_t kSealBytes = kSeal.size() + sizeof(std::uint32_t);
 constexpr const char* kSealKey = "hermesh_checksum";
@@ -53,11 +51,11 @@ std::uint32_t crc_of(std::istream& in, std::uintmax_t bytes) {
   return static_cast<std::uint32_t>(crc);
 }
 
-/// Place of a file's identifier: 36 characters behind magic number (8 bytes), three versions (4 each) and a
-/// flag (1).
+/// Position of a file's identifier: 36 characters behind the magic number (8 bytes), three versions (4 each)
+/// and a flag (1).
 constexpr std::streamoff kIdentifier = 21, kIdentifierLength = 36;
 
-/// Identifier in the form of a UUID, from the size and two checksums of all that follows it.
+/// Returns an identifier in the form of a UUID, from the size and two checksums of all that follows it.
 std::string identifier_of(std::istream& in, std::uintmax_t size) {
   constexpr std::uintmax_t kHead = kIdentifier + kIdentifierLength;
   in.seekg(kHead);
@@ -75,7 +73,7 @@ std::string identifier_of(std::istream& in, std::uintmax_t size) {
 void seal(const fs::path& path, const fs::path& named) {
   std::fstream file(path, std::ios::binary | std::ios::in | std::ios::out);
   const std::uintmax_t size = fs::file_size(path);
-  // The identifier goes first, for the seal covers it.
+  // The seal covers the identifier.
   const std::string identifier = identifier_of(file, size);
   file.seekp(kIdentifier);
   file.write(identifier.data(), kIdentifierLength);
@@ -88,11 +86,9 @@ void seal(const fs::path& path, const fs::path& named) {
   if (!file) throw Error(named.string() + " cannot be written to its end");
 }
 
-/// Whether the file ends with a seal. @throws Error if it does not fit the file.
+/// Returns true if the file ends with a seal. @throws Error if that is wrong.
 bool check_seal(const fs::path& path) {
   const std::uintmax_t size = fs::file_size(path);
-  // A file without a seal may be whole: other programs write none. Whether it should have one, its metadata
-  // say.
   if (size < kSealBytes) return false;
   std::ifstream in(path, std::ios::binary);
   in.seekg(static_cast<std::streamoff>(size - kSealBytes));
@@ -107,20 +103,19 @@ bool check_seal(const fs::path& path) {
   return true;
 }
 
-/// @throws Error unless what the transform does can be undone. OpenVDB stores inverses beside what they are
-/// inverses of.
+/// @throws Error if the transform cannot be inverted, or if its stored inverse is wrong.
 void check_transform(const openvdb::math::Transform& transform, const std::string& what) {
   const auto fail = [&] { throw Error(what + " has a transform that is not finite or cannot be inverted"); };
   const openvdb::Vec3d size = transform.voxelSize();
   for (int axis = 0; axis < 3; ++axis)
     if (!(std::isfinite(size[axis]) && size[axis] > 0.0)) fail();
   if (!transform.isLinear()) return;  // its inverse is made of it
-  // There and back by the stored inverse, from the origin, far out along each axis and off the axes.
+  // Forth and back by the stored inverse, from the origin, far out along each axis and off the axes.
   for (const openvdb::Vec3d index :
        {openvdb::Vec3d(0, 0, 0), openvdb::Vec3d(100, 0, 0), openvdb::Vec3d(0, 100, 0),
         openvdb::Vec3d(0, 0, 100), openvdb::Vec3d(-70, 20, 50)}) {
     const openvdb::Vec3d world = transform.indexToWorld(index);
-    // What is lost far from the origin, in voxels.
+    // Rounding far from the origin, in voxels.
     const double rounding = 1e-12 * world.length() / std::min({size.x(), size.y(), size.z()});
     if (!((transform.worldToIndex(world) - index).length() < 1e-3 + rounding)) fail();
   }
@@ -131,8 +126,7 @@ void check_transform(const openvdb::math::Transform& transform, const std::strin
 VdbReader::VdbReader(const fs::path& path) : path_(path), file_(path.string()) {
   initialize_openvdb();
   check_is_vdb(path);
-  // The checksum is the surest judge of damage, so it comes first; the structure is stepped through all the
-  // same, for a seal can be forged. Only then OpenVDB may open the file.
+  // The structure is checked even behind a valid seal, which can be forged. Only then OpenVDB opens the file.
   const bool sealed = check_seal(path);
   structure_ = std::make_unique<VdbStructure>(path);
   file_.open(/*delayLoad=*/false);
@@ -152,7 +146,7 @@ std::string VdbReader::joined_names() const {
   return shown(joined, 120);
 }
 
-const std::vector<const VdbDescriptor*> VdbReader::found(const std::string& name) const {
+std::vector<const VdbDescriptor*> VdbReader::found(const std::string& name) const {
   const auto grids = structure_->find(name);
   if (grids.empty())
     throw Error(path_.string() + " has no grid named '" + shown(name) + "'; it has " +
@@ -172,8 +166,8 @@ openvdb::GridBase::Ptr VdbReader::with_good_transform(const std::string& name,
 }
 
 openvdb::GridBase::Ptr VdbReader::read(const std::string& name) {
-  // Where several grids share a name, OpenVDB chooses one: all of them must be sound, and memory must do for
-  // the largest.
+  // If several grids share a name, OpenVDB chooses one: all must be sound, and memory suffice for the
+  // largest.
   double bytes = 0.0;
   for (const VdbDescriptor* grid : found(name)) bytes = std::max(bytes, structure_->check_tree(*grid));
   check_fits_memory(bytes, path_.string() + ": the grid '" + shown(name) + "'");
@@ -188,7 +182,7 @@ openvdb::GridBase::Ptr VdbReader::read_metadata(const std::string& name) {
 void write_sealed(const fs::path& file, const openvdb::GridCPtrVec& grids, const fs::path& named) {
   try {
     openvdb::io::File out(file.string());
-    // The metadata announce the seal, so that a file which lost its end is told from one of another program.
+    // The metadata announce the seal, so that a file which lost its end differs from one of another program.
     openvdb::MetaMap metadata;
     metadata.insertMeta(kSealKey,
                         openvdb::StringMetadata("CRC-32 of all but the last 12 bytes, in the last 4"));

@@ -28,7 +28,7 @@ Error not_scalar(const openvdb::GridBase& grid, const std::string& what) {
                " values; a scalar grid is needed (float, double, int32, int64, bool or mask)");
 }
 
-/// A mask as floats. It has no values but which of its samples are active: those become 1.
+/// Returns a mask as floats: 1 in active voxels.
 openvdb::FloatGrid::Ptr from_mask(const openvdb::MaskGrid& mask) {
   auto grid = openvdb::FloatGrid::create(std::make_shared<openvdb::FloatTree>(
       mask.tree(), /*inactive=*/0.0f, /*active=*/1.0f, openvdb::TopologyCopy()));
@@ -38,11 +38,9 @@ openvdb::FloatGrid::Ptr from_mask(const openvdb::MaskGrid& mask) {
 }
 
 openvdb::FloatGrid::ConstPtr as_float(const openvdb::GridBase::Ptr& grid, const std::string& what) {
-  // Most files hold floats: these are taken over without a copy.
   if (auto same = openvdb::gridPtrCast<openvdb::FloatGrid>(grid)) return same;
   if (auto mask = openvdb::gridPtrCast<openvdb::MaskGrid>(grid)) return from_mask(*mask);
-  // Other numbers are rounded to single precision; a value beyond it becomes infinite, which check_finite()
-  // finds.
+  // A value beyond single precision becomes infinite, which check_finite() refuses.
   openvdb::FloatGrid::Ptr converted;
   grid->apply<ScalarGrids>([&]<class Grid>(const Grid& scalar) {
     if constexpr (!std::is_same_v<Grid, openvdb::MaskGrid>)
@@ -52,26 +50,23 @@ openvdb::FloatGrid::ConstPtr as_float(const openvdb::GridBase::Ptr& grid, const 
   return converted;
 }
 
-/// The grid to read where the user named none. @throws Error that lists the grids if none is the obvious one.
+/// Returns the grid to read if the user named none. @throws Error that lists the grids if the choice is
+/// unclear.
 std::string chosen_grid(VdbReader& file, const fs::path& path) {
   if (file.has("sdf")) return "sdf";
-  // Types are told from metadata, so that no tree is read that is not wanted.
   const std::vector<std::string> names = file.names();
   std::vector<std::string> scalar;
   for (const std::string& name : names)
     if (is_scalar(*file.read_metadata(name))) scalar.push_back(name);
-  // One scalar grid among others is what is meant; of several nobody can tell, and where the only grid is
-  // none, its type makes the clearer complaint.
   if (names.empty()) throw Error(path.string() + " holds no grid");
   if (scalar.size() == 1) return scalar[0];
-  if (names.size() == 1) return names[0];  // its type is the reader's complaint
+  if (names.size() == 1) return names[0];  // the reader refuses its type
   throw Error(path.string() + " holds several grids (" + file.joined_names() +
               "); choose one with --grid, or keep a mask or a tolerance in a file of its own");
 }
 
 void check_finite(const openvdb::FloatGrid& grid, const std::string& what) {
-  // All values are asked, inactive ones and tiles among them: every stage that looks at signs reads those,
-  // too.
+  // Inactive values and tiles count, too, since their signs are used.
   if (!std::isfinite(grid.background())) throw Error(what + " has a background that is not finite");
   for (auto it = grid.cbeginValueAll(); it; ++it)
     if (!std::isfinite(*it)) {
@@ -89,7 +84,6 @@ GridSummary summary_of(const openvdb::GridBase& grid, const std::string& name) {
   summary.active_voxels = grid.activeVoxelCount();
   summary.memory_bytes = grid.memUsage();
   const openvdb::CoordBBox box = grid.evalActiveVoxelBoundingBox();
-  // The box of a grid without active voxels is inside out; the summary has zeros then.
   if (!box.empty())
     for (int axis = 0; axis < 3; ++axis)
       summary.lower[axis] = box.min()[axis], summary.upper[axis] = box.max()[axis];
@@ -109,7 +103,7 @@ LevelSet read_level_set(const fs::path& path, const std::string& grid_name, RunC
     VdbReader file(path);
     const std::string name = grid_name.empty() ? chosen_grid(file, path) : grid_name;
     const std::string what = "the grid '" + shown(name) + "' of " + path.string();
-    // The type is judged from the head, before memory is spent on a tree of vectors.
+    // The type is checked before memory is spent on a tree of vectors.
     const openvdb::GridBase::Ptr head = file.read_metadata(name);
     if (!is_scalar(*head)) throw not_scalar(*head, what);
     openvdb::FloatGrid::ConstPtr grid = as_float(file.read(name), what);
@@ -120,9 +114,8 @@ LevelSet read_level_set(const fs::path& path, const std::string& grid_name, RunC
 
 void write_level_set(const fs::path& path, const LevelSet& level_set, RunContext& context) {
   Stage stage(context, "write volume");
-  // Registering is done once a process; a level set may come from a program that has read no file yet.
   initialize_openvdb();
-  // A shallow copy, so that naming it does not change the grid that others hold.
+  // A shallow copy, so that the name of a shared grid does not change.
   openvdb::FloatGrid::Ptr grid = openvdb::ConstPtrCast<openvdb::FloatGrid>(level_set.grid().grid)->copy();
   grid->setName("sdf");
   write_grids(path, {grid});
@@ -133,7 +126,6 @@ std::vector<GridSummary> describe_vdb(const fs::path& path) {
     VdbReader file(path);
     std::vector<GridSummary> summaries;
     for (const std::string& name : file.names()) {
-      // Of a grid whose tree is not read (points) the summary has what its metadata say, and no voxels.
       const openvdb::GridBase::Ptr grid = file.can_read(name) ? file.read(name) : file.read_metadata(name);
       summaries.push_back(summary_of(*grid, name));
       summaries.back().is_read = file.can_read(name);

@@ -1,36 +1,28 @@
 #include "algorithms/io/vdb_file.h"
 
-#include <gtest/gtest.h>
 #include <openvdb/io/Stream.h>
 #include <openvdb/openvdb.h>
-#include <unistd.h>
 
 #include <cstring>
-#include <fstream>
 
 #include "algorithms/core/level_set_grid.h"
-#include "algorithms/hermite/samplers.h"
+#include "algorithms/io/test_mesh_files.h"
 
 namespace hermesh {
-namespace {
+namespace vdb_file_test {
 
 namespace fs = std::filesystem;
 
-class VdbFile : public testing::Test {
+class VdbFile : public MeshFileTest {
  protected:
-  void SetUp() override {
-    folder_ = fs::temp_directory_path() / ("hermesh-vdb-" + std::to_string(::getpid()));
-    fs::create_directories(folder_);
+  LevelSet read(const char* name, const std::string& grid = "") {
+    return read_level_set(folder / name, grid, context);
   }
-  void TearDown() override { fs::remove_all(folder_); }
-
   std::string error_of(const fs::path& path, const std::string& grid = "") {
-    try {
-      read_level_set(path, grid, context_);
-    } catch (const Error& e) {
-      return e.what();
-    }
-    return "no error";
+    return error_in([&] { read_level_set(path, grid, context); });
+  }
+  void write_plain(const char* name, const openvdb::GridCPtrVec& grids) const {
+    openvdb::io::File((folder / name).string()).write(grids);
   }
 
   static LevelSet ramp() {
@@ -42,14 +34,11 @@ class VdbFile : public testing::Test {
       grid->tree().setValue(openvdb::Coord(x, 0, 0), 0.25f * static_cast<float>(x));
     return make_level_set(grid);
   }
-
-  fs::path folder_;
-  RunContext context_;
 };
 
 TEST_F(VdbFile, RoundTripKeepsValuesAndPlacement) {
-  write_level_set(folder_ / "a.vdb", ramp(), context_);
-  const LevelSet back = read_level_set(folder_ / "a.vdb", "", context_);
+  write_level_set(folder / "a.vdb", ramp(), context);
+  const LevelSet back = read("a.vdb");
   EXPECT_EQ(back.active_voxels(), 7u);
   EXPECT_DOUBLE_EQ(back.voxel_size(), 0.25);
   EXPECT_EQ(back.background(), 3.0);
@@ -62,18 +51,16 @@ TEST_F(VdbFile, DoubleGridsBecomeFloat) {
   auto grid = openvdb::DoubleGrid::create(2.0);
   grid->setName("density");
   grid->tree().setValue(openvdb::Coord(1, 2, 3), -0.125);
-  openvdb::io::File((folder_ / "d.vdb").string()).write({grid});
-  EXPECT_EQ(
-      read_level_set(folder_ / "d.vdb", "", context_).grid().grid->tree().getValue(openvdb::Coord(1, 2, 3)),
-      -0.125f);
+  write_plain("d.vdb", {grid});
+  EXPECT_EQ(read("d.vdb").grid().grid->tree().getValue(openvdb::Coord(1, 2, 3)), -0.125f);
 }
 
 TEST_F(VdbFile, HalfWholeNumbersAndTruthsBecomeFloat) {
   initialize_openvdb();
   const openvdb::Coord at(1, 2, 3);
   const auto value_of = [&](const openvdb::GridBase::Ptr& grid) {
-    openvdb::io::File((folder_ / "g.vdb").string()).write({grid});
-    return read_level_set(folder_ / "g.vdb", "", context_).grid().grid->tree().getValue(at);
+    write_plain("g.vdb", {grid});
+    return read("g.vdb").grid().grid->tree().getValue(at);
   };
   auto half = openvdb::FloatGrid::create(2.0f);
   half->tree().setValue(at, -0.125f);
@@ -92,7 +79,7 @@ TEST_F(VdbFile, HalfWholeNumbersAndTruthsBecomeFloat) {
   mask->tree().setValueOn(at);
   mask->tree().addTile(2, openvdb::Coord(128, 0, 0), true, true);
   EXPECT_EQ(value_of(mask), 1.0f);
-  const LevelSet from_mask = read_level_set(folder_ / "g.vdb", "", context_);
+  const LevelSet from_mask = read("g.vdb");
   EXPECT_EQ(from_mask.active_voxels(), 1u + 128 * 128 * 128);
   EXPECT_EQ(from_mask.grid().grid->tree().getValue(openvdb::Coord(200, 5, 6)), 1.0f);
   EXPECT_EQ(from_mask.grid().grid->tree().getValue(openvdb::Coord(2, 2, 3)), 0.0f);
@@ -112,34 +99,34 @@ TEST_F(VdbFile, TheOnlyScalarGridNeedsNoName) {
   density->setName("density");
   auto velocity = openvdb::Vec3SGrid::create();
   velocity->setName("velocity");
-  openvdb::io::File((folder_ / "s.vdb").string()).write({density, velocity});
-  EXPECT_EQ(read_level_set(folder_ / "s.vdb", "", context_).grid().grid->getName(), "density");
+  write_plain("s.vdb", {density, velocity});
+  EXPECT_EQ(read("s.vdb").grid().grid->getName(), "density");
   auto heat = density->deepCopy();
   heat->setName("heat");
-  openvdb::io::File((folder_ / "t.vdb").string()).write({density, velocity, heat});
-  EXPECT_NE(error_of(folder_ / "t.vdb").find("choose one with --grid"), std::string::npos);
+  write_plain("t.vdb", {density, velocity, heat});
+  expect_words(error_of(folder / "t.vdb"), "choose one with --grid");
 }
 
 TEST_F(VdbFile, ErrorsAreOneSentenceAboutTheFile) {
-  EXPECT_NE(error_of(folder_ / "none.vdb").find("does not exist"), std::string::npos);
-  EXPECT_NE(error_of(folder_).find("is a folder"), std::string::npos);
-  std::ofstream(folder_ / "empty.vdb");
-  EXPECT_NE(error_of(folder_ / "empty.vdb").find("is empty"), std::string::npos);
-  std::ofstream(folder_ / "text.vdb") << "these are words and no volume";
-  EXPECT_NE(error_of(folder_ / "text.vdb").find("is not a .vdb file"), std::string::npos);
-  write_level_set(folder_ / "a.vdb", ramp(), context_);
-  EXPECT_NE(error_of(folder_ / "a.vdb", "fog").find("no grid named 'fog'; it has sdf"), std::string::npos);
+  expect_words(error_of(folder / "none.vdb"), "does not exist");
+  expect_words(error_of(folder), "is a folder");
+  std::ofstream(folder / "empty.vdb");
+  expect_words(error_of(folder / "empty.vdb"), "is empty");
+  std::ofstream(folder / "text.vdb") << "these are words and no volume";
+  expect_words(error_of(folder / "text.vdb"), "is not a .vdb file");
+  write_level_set(folder / "a.vdb", ramp(), context);
+  expect_words(error_of(folder / "a.vdb", "fog"), "no grid named 'fog'; it has sdf");
 }
 
 TEST_F(VdbFile, EveryTruncationIsRefused) {
-  write_level_set(folder_ / "a.vdb", ramp(), context_);
-  const auto size = fs::file_size(folder_ / "a.vdb");
+  write_level_set(folder / "a.vdb", ramp(), context);
+  const auto size = fs::file_size(folder / "a.vdb");
   std::vector<std::uintmax_t> lengths{size - 1, size - 7, size - 20, size - 200};
   for (std::uintmax_t keep = 1; keep < size; keep += size / 40) lengths.push_back(keep);
   for (const std::uintmax_t keep : lengths) {
-    fs::copy_file(folder_ / "a.vdb", folder_ / "cut.vdb", fs::copy_options::overwrite_existing);
-    fs::resize_file(folder_ / "cut.vdb", keep);
-    EXPECT_NE(error_of(folder_ / "cut.vdb"), "no error") << keep << " of " << size;
+    fs::copy_file(folder / "a.vdb", folder / "cut.vdb", fs::copy_options::overwrite_existing);
+    fs::resize_file(folder / "cut.vdb", keep);
+    EXPECT_NE(error_of(folder / "cut.vdb"), "") << keep << " of " << size;
   }
 }
 
@@ -147,19 +134,18 @@ TEST_F(VdbFile, EveryTruncationIsRefused) {
 // throws.
 #ifndef __SANITIZE_ADDRESS__
 TEST_F(VdbFile, EveryFlippedByteIsRefusedOrHarmless) {
-  write_level_set(folder_ / "a.vdb", ramp(), context_);
-  std::ifstream in(folder_ / "a.vdb", std::ios::binary);
-  const std::string good((std::istreambuf_iterator<char>(in)), {});
+  write_level_set(folder / "a.vdb", ramp(), context);
+  const std::string good = bytes_of(folder / "a.vdb");
   for (std::size_t at = 0; at < good.size(); at += 1 + good.size() / 300) {
     std::string bad = good;
     bad[at] = static_cast<char>(bad[at] ^ 0xff);
-    std::ofstream(folder_ / "bad.vdb", std::ios::binary) << bad;
-    error_of(folder_ / "bad.vdb");  // must not crash, hang or throw anything else
+    write("bad.vdb", bad);
+    error_of(folder / "bad.vdb");  // must not crash, hang or throw anything else
   }
 }
 #endif
 
-// What another program wrote has no checksum; every length in it is one that OpenVDB would believe.
+// Files of other programs have no checksum, and OpenVDB trusts every length in them.
 TEST_F(VdbFile, LengthsThatDoNotFitAreRefused) {
   initialize_openvdb();
   for (const std::uint32_t compression :
@@ -169,13 +155,13 @@ TEST_F(VdbFile, LengthsThatDoNotFitAreRefused) {
     grid->setName("sdf");
     for (int i = 0; i < 300; ++i)
       grid->tree().setValue(openvdb::Coord(i % 8, i / 8 % 8, i / 64), 0.01f * float(i));
-    openvdb::io::File file((folder_ / "long.vdb").string());
+    openvdb::io::File file((folder / "long.vdb").string());
     file.setCompression(compression);
     file.write({grid});
     file.close();
-    std::ifstream in(folder_ / "long.vdb", std::ios::binary);
-    const std::string good((std::istreambuf_iterator<char>(in)), {});
-    // The last block of values: its length in 64 bits before it, a multiple of what a byte holds.
+    const std::string good = bytes_of(folder / "long.vdb");
+    // The last block of values is preceded by its length in 64 bits, several times the largest value of a
+    // byte.
     int refused = 0;
     for (std::size_t at = good.size() - 2100; at + 8 < good.size(); ++at) {
       std::int64_t length = 0;
@@ -185,9 +171,8 @@ TEST_F(VdbFile, LengthsThatDoNotFitAreRefused) {
            {-length, std::int64_t{-4096}, length + 1, std::int64_t{1} << 40, std::int64_t{0}}) {
         std::string bad = good;
         std::memcpy(bad.data() + at, &claimed, sizeof claimed);
-        std::ofstream(folder_ / "bad.vdb", std::ios::binary) << bad;
-        EXPECT_NE(error_of(folder_ / "bad.vdb").find("is damaged or truncated"), std::string::npos)
-            << claimed;
+        write("bad.vdb", bad);
+        expect_words(error_of(folder / "bad.vdb"), "is damaged or truncated");
         ++refused;
       }
     }
@@ -202,23 +187,22 @@ TEST_F(VdbFile, GridsThatShareATreeAndStreamsAreRead) {
   const auto second = openvdb::FloatGrid::create(first->treePtr());
   first->setName("a"), second->setName("b");
   second->setTransform(openvdb::math::Transform::createLinearTransform(2.0));
-  openvdb::io::File((folder_ / "shared.vdb").string()).write({first, second});
-  EXPECT_EQ(read_level_set(folder_ / "shared.vdb", "b", context_).active_voxels(), 7u);
-  EXPECT_DOUBLE_EQ(read_level_set(folder_ / "shared.vdb", "b", context_).voxel_size(), 2.0);
+  write_plain("shared.vdb", {first, second});
+  EXPECT_EQ(read("shared.vdb", "b").active_voxels(), 7u);
+  EXPECT_DOUBLE_EQ(read("shared.vdb", "b").voxel_size(), 2.0);
   {
-    std::ofstream out(folder_ / "stream.vdb", std::ios::binary);
+    std::ofstream out(folder / "stream.vdb", std::ios::binary);
     openvdb::io::Stream(out).write({first});
   }
-  EXPECT_EQ(read_level_set(folder_ / "stream.vdb", "", context_).active_voxels(), 7u);
+  EXPECT_EQ(read("stream.vdb").active_voxels(), 7u);
 }
 
 /// Grids of points have leaves of another structure; OpenVDB knows the type, so that they can be stepped
 /// over.
 TEST_F(VdbFile, GridsOfOtherTypesAreDescribedAndNotRead) {
   const std::string type = "Tree_float_5_4_3", other = "Tree_ptidx32_5_4_3";
-  openvdb::io::File((folder_ / "p.vdb").string()).write({ramp().grid().grid});
-  std::ifstream in(folder_ / "p.vdb", std::ios::binary);
-  std::string bytes((std::istreambuf_iterator<char>(in)), {});
+  write_plain("p.vdb", {ramp().grid().grid});
+  std::string bytes = bytes_of(folder / "p.vdb");
   const std::size_t at = bytes.find(type);
   ASSERT_NE(at, std::string::npos);
   bytes[at - 4] = static_cast<char>(other.size());
@@ -230,13 +214,12 @@ TEST_F(VdbFile, GridsOfOtherTypesAreDescribedAndNotRead) {
     place += std::int64_t(other.size() - type.size());
     std::memcpy(stored, &place, sizeof place);
   }
-  std::ofstream(folder_ / "p.vdb", std::ios::binary) << bytes;
-  const auto grids = describe_vdb(folder_ / "p.vdb");
+  write("p.vdb", bytes);
+  const auto grids = describe_vdb(folder / "p.vdb");
   ASSERT_EQ(grids.size(), 1u);
   EXPECT_FALSE(grids[0].is_read);
   EXPECT_EQ(grids[0].value_type, other);
-  EXPECT_NE(error_of(folder_ / "p.vdb").find("a scalar grid is needed"), std::string::npos)
-      << error_of(folder_ / "p.vdb");
+  expect_words(error_of(folder / "p.vdb"), "a scalar grid is needed");
 }
 
 TEST_F(VdbFile, ATransformThatCannotBeInvertedIsRefused) {
@@ -245,15 +228,14 @@ TEST_F(VdbFile, ATransformThatCannotBeInvertedIsRefused) {
   grid->setName("sdf");
   grid->tree().setValue(openvdb::Coord(0), 0.5f);
   grid->setTransform(openvdb::math::Transform::createLinearTransform(0.3));
-  openvdb::io::File((folder_ / "t.vdb").string()).write({grid});
-  std::ifstream in(folder_ / "t.vdb", std::ios::binary);
-  std::string bytes((std::istreambuf_iterator<char>(in)), {});
+  write_plain("t.vdb", {grid});
+  std::string bytes = bytes_of(folder / "t.vdb");
   const double scale = 0.3, wrong = std::nan("");
   const std::size_t at = bytes.find(std::string(reinterpret_cast<const char*>(&scale), sizeof scale));
   ASSERT_NE(at, std::string::npos);
   std::memcpy(bytes.data() + at, &wrong, sizeof wrong);
-  std::ofstream(folder_ / "t.vdb", std::ios::binary) << bytes;
-  EXPECT_NE(error_of(folder_ / "t.vdb").find("transform"), std::string::npos);
+  write("t.vdb", bytes);
+  expect_words(error_of(folder / "t.vdb"), "transform");
 }
 
 TEST_F(VdbFile, ValuesThatAreNotFiniteAreNamed) {
@@ -261,9 +243,9 @@ TEST_F(VdbFile, ValuesThatAreNotFiniteAreNamed) {
   auto grid = openvdb::FloatGrid::create(1.0f);
   grid->setName("sdf");
   grid->tree().setValue(openvdb::Coord(4, 5, 6), std::nanf(""));
-  openvdb::io::File((folder_ / "nan.vdb").string()).write({grid});
-  EXPECT_NE(error_of(folder_ / "nan.vdb").find("not finite at index [4, 5, 6]"), std::string::npos);
+  write_plain("nan.vdb", {grid});
+  expect_words(error_of(folder / "nan.vdb"), "not finite at index [4, 5, 6]");
 }
 
-}  // namespace
+}  // namespace vdb_file_test
 }  // namespace hermesh

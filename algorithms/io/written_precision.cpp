@@ -1,7 +1,6 @@
 #include "algorithms/io/written_precision.h"
 
 #include <algorithm>
-#include <charconv>
 #include <cmath>
 #include <string>
 
@@ -12,17 +11,14 @@
 namespace hermesh {
 namespace {
 
+using mesh_formats::three_digits;
+
 constexpr double kMostRounding = 0.01;  // voxels
 
-std::string text(double value) {
-  char digits[32];
-  return {digits, std::to_chars(digits, digits + sizeof digits, value, std::chars_format::general, 3).ptr};
-}
-
-/// Largest coordinates, along any axis, of the box of a volume's active samples.
+/// Largest coordinates, along any axis, of the box of a volume's active samples, in world units.
 struct Farthest {
-  double from_zero = 0.0;    ///< from the zero of the world, world units
-  double from_origin = 0.0;  ///< from the origin of its meshes, world units
+  double from_zero = 0.0;    ///< from the zero of the world
+  double from_origin = 0.0;  ///< from the origin of its meshes
 };
 
 Farthest farthest(const LevelSet& level_set) {
@@ -45,7 +41,7 @@ Farthest farthest(const LevelSet& level_set) {
   return result;
 }
 
-/// Half the distance between adjacent numbers at a coordinate, where the significand has `bits` bits.
+/// Returns half the distance between adjacent numbers at a coordinate, for a significand of `bits` bits.
 double rounding_at(double coordinate, int bits) {
   return coordinate > 0.0 ? std::ldexp(1.0, std::ilogb(coordinate) - bits) : 0.0;
 }
@@ -53,28 +49,25 @@ double rounding_at(double coordinate, int bits) {
 }  // namespace
 
 bool is_written_in_single(const std::filesystem::path& path) {
-  // By the name, because the file is not there yet.
   const auto named = mesh_formats::parse_mesh_path(path);
   return named && named->format == mesh_formats::Format::stl;
 }
 
 void check_written_precision(const std::filesystem::path& path, const LevelSet& level_set) {
-  // The box of the active samples bounds every mesh of the volume, so none need be made to refuse it.
+  // The box of the active samples bounds every mesh of the volume.
   const Farthest reach = farthest(level_set);
   const double voxel = level_set.voxel_size();
   const auto check = [&](double coordinate, int bits, const std::string& precision,
                          const std::string& advice) {
-    // Rounding is to the nearest, so no coordinate moves farther than half a step.
     const double rounding = rounding_at(coordinate, bits);
     if (rounding <= kMostRounding * voxel) return;
-    throw Error(mesh_formats::in_quotes(path.string()) + ": " + precision + " rounds coordinates of " +
-                text(coordinate) + " by up to " + text(rounding) + ", more than a hundredth of a voxel of " +
-                text(voxel) + ", so nothing was written; " + advice);
+    throw Error(mesh_formats::joined(mesh_formats::in_quotes(path.string()), ": ", precision,
+                                     " rounds coordinates of ", three_digits(coordinate), " by up to ",
+                                     three_digits(rounding), ", more than a hundredth of a voxel of ",
+                                     three_digits(voxel), ", so nothing was written; ", advice));
   };
-  // From the coarsest to the finest: a file in single precision, one in double precision, and the mesh in
-  // memory, whose points are single precision about its own origin whatever the file.
-  const bool single = is_written_in_single(path);
-  if (single)
+  // The points of the mesh in memory are in single precision about its own origin.
+  if (is_written_in_single(path))
     check(reach.from_zero, 24, "STL's single precision",
           "write .ply, .obj, .off, .glb or .3mf, which hold more, or move the model nearer to the origin");
   check(reach.from_zero, 53, "double precision", "move the model nearer to the origin, or use larger voxels");

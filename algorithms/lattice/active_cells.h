@@ -1,5 +1,5 @@
-// The cells of a block that have a point, and how they are numbered: the same for dual contouring, its vector
-// code, the uniform mesh and whoever looks points up.
+// The active cells of a block and their numbering: shared by dual contouring, its vector code, the uniform
+// mesh and look-ups of points.
 #pragma once
 
 #include <cstdint>
@@ -7,18 +7,18 @@
 namespace hermesh {
 
 /// The active cells of a block of 8³ cells, and the numbers of their points, which ascend with the cells. The
-/// arrays are plain, for vector code is kept free of the standard library's functions, and the members are
-/// not initialized, so that many can be made without writing them twice.
+/// arrays are plain, since vector code must not use the standard library, and uninitialized, so that many are
+/// not written twice.
 struct ActiveCells {
   std::uint64_t active[8];    ///< cells with a crossing edge, by their first corner: the words of a BlockMask
   std::uint16_t before[8];    ///< active cells before each word
   std::uint32_t first_point;  ///< number of the first active cell's point
 };
 
-// Both are inlined always, and without the standard library, because kernels of several levels of vector code
+// Both functions are always inlined, and without the standard library, because kernels of several SIMD levels
 // call them.
 
-/// Fills in `before`. @return how many active cells there are
+/// Sets `before` and returns the number of active cells.
 [[gnu::always_inline]] inline std::uint32_t count_before(ActiveCells& cells) {
   std::uint32_t before = 0;
   for (int word = 0; word < 8; ++word) {
@@ -28,7 +28,7 @@ struct ActiveCells {
   return before;
 }
 
-/// How many active cells come before an active cell.
+/// Returns the number of active cells before an active cell.
 [[gnu::always_inline]] inline std::uint32_t rank_of(const ActiveCells& cells, int cell) {
   const std::uint64_t below = cells.active[cell >> 6] & ((std::uint64_t{1} << (cell & 63)) - 1);
   return cells.before[cell >> 6] + static_cast<std::uint32_t>(__builtin_popcountll(below));

@@ -6,7 +6,7 @@
 #include <set>
 
 namespace hermesh {
-namespace {
+namespace block_table_test {
 
 TEST(BlockTable, NumbersTheUnionHoweverItIsSpread) {
   std::mt19937 random(3);
@@ -42,5 +42,5 @@ TEST(BlockTable, CodesStandForTheirBlocks) {
   EXPECT_EQ(table.tiles().size(), 2u) << "memory is for what is there";
 }
 
-}  // namespace
+}  // namespace block_table_test
 }  // namespace hermesh

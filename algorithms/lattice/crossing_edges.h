@@ -1,5 +1,5 @@
-// The crossing edges of a block and how they are numbered: as Hermite data keep their crossings, marching
-// cubes its points.
+// The crossing edges of a block and their numbering: for the crossings of Hermite data and the points of
+// marching cubes.
 #pragma once
 
 #include <array>
@@ -12,12 +12,12 @@
 namespace hermesh {
 
 /// The crossing edges that a block owns, numbered by axis and then by first sample. (Without initializers, so
-/// that many can be made without writing them twice.)
+/// that many are not written twice.)
 struct CrossingEdges {
   std::array<BlockMask, 3> crossing;                   ///< samples whose up-wind edge is crossed, by axis
   std::array<std::array<std::uint16_t, 8>, 3> before;  ///< number of crossing edges before each axis and word
 
-  /// Rank of a crossing edge among those of the block.
+  /// Returns the rank of a crossing edge among those of the block.
   std::uint32_t rank(int axis, int sample) const {
     const int word = sample >> 6;
     return before[axis][word] + static_cast<std::uint32_t>(std::popcount(
@@ -30,7 +30,7 @@ struct CrossingEdges {
       for_each_bit(crossing[static_cast<std::size_t>(axis)], [&](int sample) { f(axis, sample); });
   }
   int crossing_count() const { return before[2][7] + std::popcount(crossing[2][7]); }
-  /// Fills in `before` from `crossing`.
+  /// Sets `before` from `crossing`.
   void count_before() {
     int sum = 0;
     for (int axis = 0; axis < 3; ++axis)

@@ -15,8 +15,8 @@ using openvdb::Coord;
 using Tree = openvdb::FloatTree;
 using Leaf = Tree::LeafNodeType;
 
-/// Extends the box by the leaf's active voxels, as Leaf::evalActiveBoundingBox() would by a look at one voxel
-/// after the other. Here a word of the mask is a layer along x, a byte of it a row along z.
+/// Extends the box by the leaf's active voxels, as Leaf::evalActiveBoundingBox() does voxel by voxel. A word
+/// of the mask is a layer along x, a byte of it a row along z.
 void include_active(const Leaf& leaf, openvdb::CoordBBox& box) {
   Coord lowest(8), highest(-1);
   std::uint64_t any_x = 0;
@@ -27,8 +27,7 @@ void include_active(const Leaf& leaf, openvdb::CoordBBox& box) {
     any_x |= word;
   }
   if (any_x == 0) return;
-  // All layers over each other tell which rows along y hold a voxel; all rows over each
-  // other, in the lowest byte, tell z.
+  // The union of all layers gives the rows along y; the union of all rows, in the lowest byte, z.
   lowest.y() = std::countr_zero(any_x) / 8, highest.y() = 7 - std::countl_zero(any_x) / 8;
   for (const int half : {32, 16, 8}) any_x |= any_x >> half;
   const auto any_y = static_cast<std::uint8_t>(any_x);
@@ -41,8 +40,7 @@ void include_active(const Leaf& leaf, openvdb::CoordBBox& box) {
 openvdb::CoordBBox active_box(const openvdb::FloatTree& tree) {
   using Upper = Tree::RootNodeType::ChildNodeType;
   using Lower = Upper::ChildNodeType;
-  // From large to small: what is active in large tiles often makes a look at the nodes and
-  // leaves within the box needless.
+  // From large to small: active large tiles often make the nodes and leaves within the box irrelevant.
   openvdb::CoordBBox box;
   for (auto tile = tree.root().cbeginValueOn(); tile; ++tile) box.expand(tile.getCoord(), Upper::DIM);
   for (auto upper = tree.root().cbeginChildOn(); upper; ++upper) {
@@ -62,7 +60,7 @@ IndexToWorld placement_of(const openvdb::FloatGrid& grid) {
   if (!grid.transform().isLinear())
     throw Error(
         "the volume has a perspective transform, which is not supported; resample it to a linear one");
-  // OpenVDB multiplies rows by matrices (p M), Eigen matrices by columns: the linear part is transposed.
+  // OpenVDB multiplies rows by matrices (p M), Eigen matrices by columns, so the linear part is transposed.
   const openvdb::Mat4R matrix = grid.transform().baseMap()->getAffineMap()->getMat4();
   IndexToWorld result;
   for (int row = 0; row < 3; ++row)
@@ -80,7 +78,7 @@ IndexToWorld placement_of(const openvdb::FloatGrid& grid) {
       result.base[axis] =
           std::abs(middle) > reach ? 8 * static_cast<std::int32_t>(std::floor(middle / 8)) : 0;
     }
-    // An affine map takes the box to a parallelepiped, whose bounds are those of its eight corners.
+    // An affine map takes the box to a parallelepiped, bounded by its eight corners.
     for (int corner = 0; corner < 8; ++corner) {
       const Eigen::Vector3d index((corner & 1 ? box.max() : box.min()).x(),
                                   (corner & 2 ? box.max() : box.min()).y(),
@@ -89,7 +87,7 @@ IndexToWorld placement_of(const openvdb::FloatGrid& grid) {
     }
     result.origin = choose_origin(world);
   }
-  // Large numbers cancel here, once for the grid and in double precision, instead of at every sample.
+  // Large numbers cancel once, in double precision, instead of at every sample.
   const Eigen::Vector3d base(result.base[0], result.base[1], result.base[2]);
   result.offset = result.linear * base + (translation - result.origin);
   return result;

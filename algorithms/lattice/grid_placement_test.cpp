@@ -7,7 +7,7 @@
 #include "algorithms/core/level_set_grid.h"
 
 namespace hermesh {
-namespace {
+namespace grid_placement_test {
 
 using openvdb::Coord;
 
@@ -60,5 +60,5 @@ TEST(GridPlacement, OfAShearedMirroredGridIsTheGridsOwn) {
   EXPECT_TRUE(placement.mirrors());
 }
 
-}  // namespace
+}  // namespace grid_placement_test
 }  // namespace hermesh

@@ -1,7 +1,6 @@
 #include "algorithms/lattice/leaf_table.h"
 
 #include <tbb/blocked_range.h>
-#include <tbb/parallel_for.h>
 #include <tbb/parallel_reduce.h>
 
 #include <algorithm>
@@ -29,19 +28,18 @@ constexpr std::array<float, 512> make_no_samples() {
 }
 constexpr std::array<float, 512> kNoSamples = make_no_samples();
 
-/// How many leaves, and how many leaves' samples, are prefetched. To wait for one leaf after the other, and
-/// for the samples that it points to, would take longer than all the rest.
+/// Distances of prefetching, in leaves and in leaves' samples: their latency exceeds all other costs.
 constexpr std::size_t kLeavesAhead = 16, kSamplesAhead = 4;
 
-/// Most pairs of blocks that may change their sign where neither holds samples. A few bytes in a file, as a
-/// damaged one has them, can stand for a surface of any size; extractors hold some 15 kB for the 64 edges of
-/// a pair (leaves, their copies, a crossing and a polygon each), so that this is a gibibyte, on any machine.
-/// Level sets have none, and a cube that is one tile reaches it at a width of 864 voxels.
+/// Most pairs of blocks that may change their sign where neither holds samples. A few bytes of a damaged file
+/// can describe a surface of any size; extractors need about 15 kB for the 64 edges of a pair (leaves, their
+/// copies, a crossing and a polygon each), so that this is a gibibyte. Level sets have none, and a cube that
+/// is one tile reaches it at a width of 864 voxels.
 constexpr double kMostTilePairs = 70e3;
 
-/// Calls f(own, there, axis, width) for squares of blocks of the tile's faces across an axis beyond which
-/// there is a tile whose value `wanted` takes: the first block within, the first beyond, and the width in
-/// samples. Squares are as large as the tiles beyond.
+/// Calls f(own, there, axis, width) for squares of blocks of the tile's faces across an axis that border a
+/// tile whose value satisfies `wanted`: the first block within, the first beyond, and the width in samples.
+/// Squares are as large as the tiles beyond.
 template <class Wanted, class F>
 void for_each_bordering_tile(const openvdb::FloatTree& tree, const openvdb::CoordBBox& tile, Wanted&& wanted,
                              F&& f) {
@@ -52,8 +50,8 @@ void for_each_bordering_tile(const openvdb::FloatTree& tree, const openvdb::Coor
   for (int axis = 0; axis < 3; ++axis) {
     const int u = (axis + 1) % 3, v = (axis + 2) % 3;
     const auto square = [&](auto&& self, Coord own, Coord there, int width) -> void {
-      // A square is divided where a node of its own width lies beyond, and left out where in the end a leaf
-      // does. A tile beyond that is wider than the square counts with the square's width.
+      // A square is divided where a node of its own width lies beyond, and omitted where finally a leaf does.
+      // A tile beyond that is wider than the square counts with the square's width.
       const bool divided = width > int(Node::DIM) ? access.probeConstNode<LargeNode>(there) != nullptr
                            : width > 8            ? access.probeConstNode<Node>(there) != nullptr
                                                   : access.probeConstLeaf(there) != nullptr;
@@ -92,8 +90,8 @@ InsideRule inside_rule(const openvdb::FloatGrid& grid, double isovalue) {
   const bool greater_is_inside =
       grid.getGridClass() != openvdb::GRID_LEVEL_SET && grid.background() < isovalue;
   rule.scale = greater_is_inside ? -1.0f : 1.0f;
-  // The isovalue is rounded away from the inside, so that a comparison of floats decides as one with the
-  // isovalue itself does.
+  // The isovalue is rounded away from the inside, so that comparisons of floats agree with the exact
+  // isovalue.
   constexpr float kLargest = std::numeric_limits<float>::max();
   rule.isovalue = static_cast<float>(std::clamp(isovalue, -double(kLargest), double(kLargest)));
   if (!greater_is_inside && rule.isovalue < isovalue) rule.isovalue = std::nextafter(rule.isovalue, kLargest);
@@ -103,16 +101,15 @@ InsideRule inside_rule(const openvdb::FloatGrid& grid, double isovalue) {
 
 std::vector<Coord> tiles_between_signs(const openvdb::FloatTree& tree, const InsideRule& is_inside,
                                        RunContext& context) {
-  // Where two tiles differ in sign, one of them is unlike the background; the others may fill space without
-  // end.
+  // Of two tiles of different sign, one is unlike the background; the others may fill infinite space.
   const bool background = is_inside(tree.background());
   std::vector<openvdb::CoordBBox> tiles;
   openvdb::FloatTree::ValueAllCIter it = tree.cbeginValueAll();
   it.setMaxDepth(openvdb::FloatTree::ValueAllCIter::LEAF_DEPTH - 1);
   for (; it; ++it)
     if (is_inside(*it) != background) tiles.push_back(it.getBoundingBox());
-  // Counted first, before anything is listed: a damaged file is refused before it takes memory. Only the side
-  // that is unlike the background is walked over, so that each pair is met once.
+  // Counted before anything is listed: a damaged file is refused before it takes memory. Only the side unlike
+  // the background is traversed, so that each pair is counted once.
   std::vector<double> pairs(tiles.size());
   const auto bordering = [&](std::size_t i, auto&& f) {
     for_each_bordering_tile(
@@ -139,7 +136,7 @@ std::vector<Coord> tiles_between_signs(const openvdb::FloatTree& tree, const Ins
           }
     });
   });
-  // Joined in the order of the tiles, and so the same for any number of threads.
+  // Joined in the order of the tiles.
   std::vector<Coord> all;
   for (const auto& list : found) all.insert(all.end(), list.begin(), list.end());
   return all;
@@ -173,24 +170,18 @@ void LeafPlaces::number_leaves(RunContext& context, bool with_values) {
     index.emplace(sources[i]->origin(), static_cast<std::int32_t>(i));
     counts[i] = sources[i]->getChildMask().countOn();
   }
-  // The scan turns counts into the number of each node's first leaf, so that nodes number their leaves side
-  // by side.
+  // The scan turns counts into the number of each node's first leaf.
   const std::uint64_t total = exclusive_scan(counts, "leaves");
   places_.resize(total);
   leaves_.resize(total);
-  // The two numbers that stand for "no leaf" are negative; with the array moved on by two,
-  // values() takes them without a branch.
+  // The two numbers for "no leaf" are negative; with the array shifted by two, values() reads them without a
+  // branch.
   values_.resize(total + kUniforms);
   std::fill_n(values_.begin(), kUniforms, kNoSamples.data());
   around_.resize(total);
   numbers_.resize(sources.size());
-  const auto each_node = [&](auto&& f) {
-    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, sources.size()), [&](const auto& range) {
-      context.check();
-      for (std::size_t i = range.begin(); i < range.end(); ++i) f(i);
-    });
-  };
-  // A node writes its own entry and those of its own leaves alone.
+  const auto each_node = [&](auto&& f) { parallel_blocks(sources.size(), context, f, 1); };
+  // A node writes only its own entry and those of its own leaves.
   each_node([&](std::size_t i) {
     Node& node = nodes_[i];
     node.source = sources[i];
@@ -214,23 +205,22 @@ void LeafPlaces::number_leaves(RunContext& context, bool with_values) {
       find_values(leaf);
     }
   });
-  // A second pass, because what lies around a node is copied from its neighbours' numbers, which must all be
-  // there; each node writes its own rim, which no other one reads.
+  // Second, since the surroundings of a node are copied from its neighbours' numbers; each node writes its
+  // own boundary, which no other one reads.
   each_node([&](std::size_t i) { number_around(i); });
   nodes_in_order_.resize(sources.size());
   std::iota(nodes_in_order_.begin(), nodes_in_order_.end(), 0u);
   std::ranges::sort(nodes_in_order_, {}, [&](std::uint32_t node) { return nodes_[node].lower; });
 }
 
-/// Finds which slots of the node hold children, which tiles are inside, and the tile inside
-/// that is nearest to the isovalue.
+/// Finds the slots of the node with children, the tiles inside, and the tile inside that is nearest to the
+/// isovalue.
 void LeafPlaces::find_tiles(Node& node) const {
   static_assert(TreeNode::NUM_VALUES == 64 * kWords);
   for (int word = 0; word < kWords; ++word) {
     node.child[word] = node.source->getChildMask().getWord<std::uint64_t>(word);
     const auto* const table = node.source->getTable() + 64 * word;
-    // All slots are read, without branches. One with a child holds a pointer instead of a value, and what the
-    // rule makes of its bits is masked away.
+    // All slots are read, without branches; the result for pointers to children is masked.
     std::uint64_t inside = 0;
     for (int bit = 0; bit < 64; ++bit)
       inside |= static_cast<std::uint64_t>(rule_(table[bit].getValue())) << bit;
@@ -241,8 +231,7 @@ void LeafPlaces::find_tiles(Node& node) const {
   }
 }
 
-/// Numbers the node's leaves from `next` on in the order of its slots, which is that of
-/// OpenVDB's own walk over the tree.
+/// Numbers the node's leaves from `next` on in the order of its slots, which is that of OpenVDB's traversal.
 void LeafPlaces::number(Node& node, std::uint32_t index, std::uint32_t next) {
   Numbers& numbers = numbers_[index];
   // A row is 16 slots along z, a quarter of a word of the masks.
@@ -263,13 +252,13 @@ void LeafPlaces::number(Node& node, std::uint32_t index, std::uint32_t next) {
   node.first_at[16] = next;
 }
 
-/// Fills the rim of the node's numbers, one step around it, from those in its neighbours.
+/// Fills the boundary of the node's numbers, one step around it, from those of its neighbours.
 void LeafPlaces::number_around(std::size_t node) {
   for (int slot = 0; slot < 27; ++slot) {
     if (slot == neighbour_slot(0, 0, 0)) continue;
     const int step[3] = {slot / 9 - 1, slot / 3 % 3 - 1, slot % 3 - 1};
     const std::int32_t there = nodes_[node].neighbours[slot];
-    // The part of the rim in that direction: a face of 16² places, an edge of 16 or a corner.
+    // The part of the boundary in that direction: a face of 16² slots, an edge of 16 or a corner.
     int first[3], end[3];
     for (int axis = 0; axis < 3; ++axis) {
       first[axis] = step[axis] < 0 ? -1 : step[axis] > 0 ? 16 : 0;
@@ -292,13 +281,11 @@ void LeafPlaces::number_around(std::size_t node) {
 
 LeafTable::LeafTable(const LevelSet& level_set, double isovalue, RunContext& context)
     : LeafPlaces(level_set, isovalue) {
-  // Samples are found while the signs are read, one wait for both.
   number_leaves(context, false);
   read_signs(context);
   if (is_complete(context)) return;
-  // Rare: bands thinner than a voxel, tiles that were made by hand. A new leaf may meet further tiles of the
-  // other sign only where the tile it was made from did, so one round is enough; the loop does not rely on
-  // it.
+  // Rare: bands thinner than a voxel, manually made tiles. A new leaf may meet further tiles of the other
+  // sign only where the tile that it was made from did, so one round is enough.
   auto copy = std::make_shared<openvdb::FloatTree>(*tree_);
   do {
     for (const Coord& lower : missing_leaves(context)) copy->touchLeaf(lower);
@@ -314,30 +301,27 @@ void throw_not_finite() {
 
 void LeafTable::read_signs(RunContext& context) {
   inside_.resize(size());
-  // Each leaf's signs are written by one thread; the flag is only ever raised, so that no order matters.
+  // The flag is only ever set, so that no order matters.
   std::atomic<bool> not_finite{false};
   const SignReader& reader = chosen_kernels<SignReader>();
-  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, size(), 64), [&](const auto& range) {
-    context.check();
+  const auto read_range = [&](std::size_t begin, std::size_t end) {
     bool finite = true;
     constexpr std::size_t kLine = 16;
-    // Two steps of one chain: the leaf must have come before its pointer to the samples can be
-    // read, and these be asked for.
+    // The leaf must be in the cache before its pointer to the samples can be read, and these prefetched.
     const auto find = [&](std::size_t i) {
       find_values(i);
       for (std::size_t sample = 0; sample < 512; sample += kLine) __builtin_prefetch(values(i) + sample);
     };
-    for (std::size_t i = range.begin(); i < std::min(range.begin() + kLeavesAhead, range.end()); ++i)
-      ask_for(i);
-    for (std::size_t i = range.begin(); i < std::min(range.begin() + kSamplesAhead, range.end()); ++i)
-      find(i);
-    for (std::size_t i = range.begin(); i < range.end(); ++i) {
-      if (i + kLeavesAhead < range.end()) ask_for(i + kLeavesAhead);
-      if (i + kSamplesAhead < range.end()) find(i + kSamplesAhead);
+    for (std::size_t i = begin; i < std::min(begin + kLeavesAhead, end); ++i) ask_for(i);
+    for (std::size_t i = begin; i < std::min(begin + kSamplesAhead, end); ++i) find(i);
+    for (std::size_t i = begin; i < end; ++i) {
+      if (i + kLeavesAhead < end) ask_for(i + kLeavesAhead);
+      if (i + kSamplesAhead < end) find(i + kSamplesAhead);
       finite &= reader.leaf(values(i), rule_, inside_[i].data());
     }
     if (!finite) not_finite = true;
-  });
+  };
+  parallel_ranges(size(), context, RangeFunction(read_range), 64);
   if (not_finite) throw_not_finite();
 }
 
@@ -375,7 +359,7 @@ std::vector<LeafPlaces::Slab> LeafPlaces::slabs() const {
   std::vector<Slab> result;
   const std::span<const std::uint32_t> nodes = nodes_in_order_;
   const auto x_of = [&](std::size_t i) { return nodes_[nodes[i]].lower[0]; };
-  // Sorted by their coordinates, nodes of one x stand together; each such group makes 16 layers of leaves.
+  // Nodes of one x are adjacent; each group makes 16 layers of leaves.
   for (std::size_t first = 0, end; first < nodes.size(); first = end) {
     for (end = first + 1; end < nodes.size() && x_of(end) == x_of(first); ++end) continue;
     for (int x = 0; x < 16; ++x) result.push_back({nodes.subspan(first, end - first), x});
@@ -383,8 +367,8 @@ std::vector<LeafPlaces::Slab> LeafPlaces::slabs() const {
   return result;
 }
 
-/// True if two tiles of different sign touch, both within the node or one in it and one beyond. Rows of 16
-/// along z are compared with their neighbours as bits.
+/// Returns true if two tiles of different sign touch, both within the node or one in it and one beyond. Rows
+/// of 16 along z are compared with their neighbours as bits.
 bool LeafPlaces::tiles_meet(const Node& node) const {
   struct Row {
     std::uint32_t tile, inside;
@@ -411,15 +395,15 @@ bool LeafPlaces::tiles_meet(const Node& node) const {
       met |= meet(own, {below.tile >> 15, below.inside >> 15}) & 1;
       met |= meet(own, y < 15 ? row_of(node, x, y + 1) : row_at(x, 16, 0));
       met |= meet(own, x < 15 ? row_of(node, x + 1, y) : row_at(16, y, 0));
-      // Pairs are met from below, but for those at the node's lower sides: what lies beyond may be a tile as
-      // large as the node, which compares nothing itself.
+      // Pairs are tested from below, except at the node's lower sides: beyond may be a tile as large as the
+      // node, which tests nothing itself.
       if (y == 0) met |= meet(own, row_at(x, -1, 0));
       if (x == 0) met |= meet(own, row_at(-1, y, 0));
     }
   return met != 0;
 }
 
-/// Whether all signs of the first layer along the axis are `inside`.
+/// Returns true if all signs of the first layer along the axis are `inside`.
 bool LeafPlaces::first_layer_is(const BlockMask& signs, int axis, bool inside) {
   const std::uint64_t layer = first_layers(axis == 1, axis == 2);
   for (int x = 0; x < (axis == 0 ? 1 : 8); ++x)
@@ -428,13 +412,13 @@ bool LeafPlaces::first_layer_is(const BlockMask& signs, int axis, bool inside) {
 }
 
 bool LeafPlaces::tiles_of_both_signs_meet(RunContext& context) const {
-  // Nodes with smaller tiles first, which is a few operations on bits for each.
+  // Nodes with smaller tiles first, a few operations on bits for each.
   std::atomic<bool> meet{false};
   parallel_blocks(nodes_.size(), context, [&](std::size_t i) {
     if (!meet && tiles_meet(nodes_[i])) meet = true;
   });
   if (meet) return true;
-  // Tiles as large as a node or larger: only those unlike the background need a look, and there are few.
+  // Tiles as large as a node or larger: only the few unlike the background.
   const std::vector<openvdb::CoordBBox> tiles = large_tiles_unlike_background(context);
   parallel_blocks(tiles.size(), context, [&](std::size_t i) {
     if (!meet && meets_background(tiles[i])) meet = true;
@@ -442,10 +426,9 @@ bool LeafPlaces::tiles_of_both_signs_meet(RunContext& context) const {
   return meet;
 }
 
-/// True if every edge with a change of sign starts in a leaf.
+/// Returns true if every edge with a change of sign starts in a leaf.
 bool LeafTable::is_complete(RunContext& context) const {
-  // Edges that end in a leaf and start in none, then edges between two tiles; all others start in a leaf by
-  // themselves.
+  // Edges that end in a leaf and start in none, then edges between two tiles; all others start in a leaf.
   std::atomic<bool> complete{true};
   parallel_blocks(size(), context, [&](std::size_t i) {
     for (int axis = 0; axis < 3; ++axis)
@@ -464,7 +447,7 @@ std::vector<openvdb::CoordBBox> LeafPlaces::large_tiles_unlike_background(RunCon
     if (rule_(*it) != background) add(it.getCoord(), LargeNode::DIM);
   std::vector<const LargeNode*> nodes;
   tree_->getNodes(nodes);
-  // An iterator over the tiles takes longer than all else that is done with a leaf's signs.
+  // An iterator over the tiles would take longer than all other work on signs.
   constexpr std::size_t kTogether = 64;
   static_assert(LargeNode::NUM_VALUES % kTogether == 0);
   for (const LargeNode* node : nodes) {
@@ -486,7 +469,7 @@ std::vector<openvdb::CoordBBox> LeafPlaces::large_tiles_unlike_background(RunCon
   return found;
 }
 
-/// True if a tile as large as a node or larger touches another one with the background's sign.
+/// Returns true if a tile as large as a node or larger touches another one with the background's sign.
 bool LeafPlaces::meets_background(const openvdb::CoordBBox& box) const {
   const bool background = rule_(tree_->background());
   Accessor access(*tree_);
@@ -494,7 +477,7 @@ bool LeafPlaces::meets_background(const openvdb::CoordBBox& box) const {
     for (const int side : {-1, 1}) {
       Coord there = box.min();
       there[axis] += side > 0 ? box.dim()[axis] : -1;
-      // Smaller tiles beyond were compared with this one from their own side.
+      // Smaller tiles beyond were compared from their own side.
       for (int a = 0; a < box.dim()[(axis + 1) % 3]; a += TreeNode::DIM)
         for (int b = 0; b < box.dim()[(axis + 2) % 3]; b += TreeNode::DIM) {
           Coord at = there;

@@ -12,7 +12,7 @@
 #include "algorithms/lattice/simd/simd_level.h"
 
 namespace hermesh {
-namespace {
+namespace leaf_table_test {
 
 using openvdb::Coord;
 
@@ -24,7 +24,7 @@ class LeafTableTest : public testing::Test {
   }
 
   /// Every edge with a change of sign must start in a leaf: the last samples of a leaf and of each of its
-  /// neighbours are compared with what the tree itself says.
+  /// neighbours are compared with the values in the tree itself.
   static void expect_complete(const LeafTable& table, const openvdb::CoordBBox& box) {
     const auto inside = [&](const Coord& at) { return table.rule()(table.tree().getValue(at)); };
     for (auto it = box.begin(); it; ++it)
@@ -111,7 +111,7 @@ TEST_F(LeafTableTest, TilesOfBothSignsSideBySideBecomeLeaves) {
   grid->setGridClass(openvdb::GRID_LEVEL_SET);
   grid->tree().addTile(1, Coord(0, 0, 0), -3.0f, false);
   const LeafTable small = table(grid);
-  EXPECT_EQ(small.size(), 7u);  // the tile and those beside it, of which three own edges that lead into it
+  EXPECT_EQ(small.size(), 7u);  // the tile and its neighbours, three of which own edges that lead into it
   expect_complete(small, openvdb::CoordBBox(Coord(-10), Coord(18)));
 
   grid->tree().addTile(2, Coord(256, 0, 0), -3.0f, false);
@@ -151,7 +151,7 @@ TEST_F(LeafTableTest, AComparisonWithARoundedIsovalueDecidesAsWithTheExactOne) {
     }
 }
 
-/// Every sample of a leaf, values at the isovalue and beside it among them, and a bad value at every place.
+/// Every sample of a leaf, including values at and near the isovalue, and a bad value at every position.
 TEST_F(LeafTableTest, SignsAreTheSameAtAnyLevelOfVectorCode) {
   std::mt19937 random(31);
   for (const SimdLevel level : available_simd_levels()) {
@@ -165,7 +165,7 @@ TEST_F(LeafTableTest, SignsAreTheSameAtAnyLevelOfVectorCode) {
         leaf->setValueOn(
             i, std::nextafter(isovalue, float(int(random() % 3) - 1)) + float(int(random() % 3) - 1));
       const LeafTable leaves = table(grid, isovalue);
-      std::size_t number = 0;  // tiles beside it may have become leaves
+      std::size_t number = 0;  // neighbouring tiles may have become leaves
       while (leaves.lower(number) != std::array<std::int32_t, 3>{}) ++number;
       for (int i = 0; i < 512; ++i) {
         const float value = leaf->getValue(static_cast<openvdb::Index>(i));
@@ -200,7 +200,7 @@ TEST_F(LeafTableTest, LookingUpWhereThereIsNoLeafIsRefusedInASentence) {
     }
     return "";
   };
-  // A neighbour that is outside throughout, and what is beyond all neighbours.
+  // A neighbour that is outside throughout, and a position beyond all neighbours.
   EXPECT_NE(sentence(8, 0, 0).find("sample (8, 0, 0) of the leaf at (0, 0, 0)"), std::string::npos);
   EXPECT_NE(sentence(0, -1, 7).find("no leaf"), std::string::npos);
   EXPECT_NE(sentence(16, 0, 0).find("no leaf"), std::string::npos);
@@ -234,5 +234,5 @@ TEST_F(LeafTableTest, ValuesThatAreNotFiniteAreRefused) {
   EXPECT_THROW(table(openvdb::FloatGrid::create(1.0f), std::nan("")), Error);
 }
 
-}  // namespace
+}  // namespace leaf_table_test
 }  // namespace hermesh

@@ -19,14 +19,14 @@
 namespace hermesh {
 namespace {
 
-/// A float leaf of 8³ voxels with its masks, and the nodes of 16³ and 32³ children above it.
+/// Bytes of a float leaf of 8³ voxels with its masks, and of the nodes of 16³ and 32³ children above it.
 constexpr double kLeafBytes = 2152.0, kMiddleBytes = 33.8e3, kUpperBytes = 270e3;
-/// OpenVDB's meshToVolume holds a closest-polygon index beside each distance, and dilated copies of both,
-/// while it works: 3.2 to 3.5 times the finished grid, measured on four meshes at three resolutions each.
+/// OpenVDB's meshToVolume stores a closest-polygon index beside each distance, and dilated copies of both:
+/// 3.2 to 3.5 times the finished grid, measured on four meshes at three resolutions each.
 constexpr double kPeakOverGrid = 3.5;
 /// OpenVDB's scale maps refuse a determinant below 3e-15, which is a voxel of 1.4423e-5.
 constexpr double kSmallestVoxel = 1.4423e-5;
-/// Largest voxel coordinate that is taken, half of what an index of 32 bits holds.
+/// Largest accepted voxel coordinate, half of the range of 32-bit indices.
 constexpr double kLargestIndex = 1 << 30;
 
 std::string format(const char* pattern, double value) {
@@ -37,11 +37,11 @@ std::string format(const char* pattern, double value) {
 
 std::string gibibytes(double bytes) { return format("%.3g GiB", bytes / (1024.0 * 1024.0 * 1024.0)); }
 
-/// Items that one task goes through; fixed, so that sums do not depend on the number of threads.
+/// Items per task; constant, so that sums do not depend on the number of threads.
 constexpr std::size_t kItemsPerTask = 1 << 16;
 
 Bounds joined(Bounds a, const Bounds& b) {
-  // Written so that a NaN of either stays.
+  // A NaN of either is preserved.
   const auto pick = [](double x, double y, bool first) {
     return std::isnan(x) || (first && !std::isnan(y)) ? x : y;
   };
@@ -52,14 +52,14 @@ Bounds joined(Bounds a, const Bounds& b) {
   return a;
 }
 
-/// What one pass over the polygons tells.
+/// Properties of the polygons.
 struct Measured {
   Bounds box;       ///< bounds of the corners, relative to the mesh's origin; not finite if a corner is not
-  double area = 0;  ///< square world units; no number if a corner is none
+  double area = 0;  ///< square world units; NaN if a corner is
 };
 
-/// Gathers bounds and area of one triangle after the other. Corners stay in single precision for the bounds,
-/// which are exact in it; the area is summed in double precision.
+/// Accumulates bounds and area of triangles. Bounds are exact in single precision; the area is summed in
+/// double precision.
 class Measure {
  public:
   void add(const Eigen::Vector3f& a, const Eigen::Vector3f& b, const Eigen::Vector3f& c) {
@@ -69,7 +69,7 @@ class Measure {
     area_ += 0.5 * (b.cast<double>() - p).cross(c.cast<double>() - p).norm();
   }
   Measured result() const {
-    // Comparisons pass over a coordinate that is no number, but every one of them goes into the area.
+    // Comparisons ignore NaN, but the area includes every coordinate.
     const float nan = std::numeric_limits<float>::quiet_NaN();
     const Eigen::Array3f high = std::isnan(area_) ? Eigen::Array3f::Constant(nan) : high_;
     return {{low_.matrix().cast<double>(), high.matrix().cast<double>()}, area_};
@@ -82,7 +82,6 @@ class Measure {
 
 Measured measure(const PolygonMesh& mesh) {
   const std::size_t triangles = mesh.triangles.size(), n = triangles + mesh.quads.size();
-  // A task writes its own entry of `parts` alone; they are joined in order below.
   std::vector<Measured> parts((n + kItemsPerTask - 1) / kItemsPerTask);
   tbb::parallel_for(std::size_t(0), parts.size(), [&](std::size_t part) {
     const std::size_t begin = part * kItemsPerTask, end = std::min(n, begin + kItemsPerTask);
@@ -93,7 +92,7 @@ Measured measure(const PolygonMesh& mesh) {
     }
     for (std::size_t i = std::max(begin, triangles); i < end; ++i) {
       const Quad& q = mesh.quads[i - triangles];
-      // A quad counts as two triangles; which diagonal cuts it makes no difference to an estimate.
+      // The diagonal makes no difference to an estimate.
       measure.add(mesh.points[q[0]], mesh.points[q[1]], mesh.points[q[2]]);
       measure.add(mesh.points[q[0]], mesh.points[q[2]], mesh.points[q[3]]);
     }
@@ -107,8 +106,8 @@ Measured measure(const PolygonMesh& mesh) {
   return all;
 }
 
-/// Blocks of 8³, 128³ and 4096³ voxels that hold a point: how many of each. Stray points that no polygon uses
-/// count, too; there are few.
+/// Returns the numbers of blocks of 8³, 128³ and 4096³ voxels that hold a point, including the few points
+/// that no polygon uses.
 std::array<double, 3> blocks_with_points(const PolygonMesh& mesh, double voxel_size) {
   std::vector<BlockSet> parts((mesh.points.size() + kItemsPerTask - 1) / kItemsPerTask);
   const double scale = 1.0 / (8.0 * voxel_size);
@@ -117,7 +116,7 @@ std::array<double, 3> blocks_with_points(const PolygonMesh& mesh, double voxel_s
          ++i) {
       BlockAt block;
       for (int axis = 0; axis < 3; ++axis)
-        // Held within the range of integers: estimate_band() does not check how far out a mesh lies.
+        // Clamped to the range of integers, since estimate_band() does not check it.
         block[std::size_t(axis)] = static_cast<std::int32_t>(
             std::floor(std::clamp(double(mesh.points[i][axis]) * scale, -kLargestIndex, kLargestIndex)));
       parts[part].insert(block);
@@ -134,7 +133,7 @@ std::array<double, 3> blocks_with_points(const PolygonMesh& mesh, double voxel_s
           double(BlockTable({coarse[1]}).size())};
 }
 
-/// What the estimates of blocks of any size share.
+/// Inputs of estimates for blocks of any size.
 struct BandSize {
   double surface;         ///< area in faces of voxels
   double thickness;       ///< thickness of the band, voxels
@@ -146,12 +145,13 @@ struct Blocks {
   double along_surface, scattered, all;
 };
 
-/// A plane layer of thickness t with unit normal n meets (e |n|₁ + t) / e³ blocks of edge e a unit of area,
-/// and |n|₁ is 3/2 on average over all directions. Blocks with points beyond those that the area explains are
-/// small scattered pieces, each of which costs as much as a point's ball. The box is the upper limit.
+/// Estimates the numbers of blocks. A plane layer of thickness t with unit normal n meets (e |n|₁ + t) / e³
+/// blocks of edge e per unit of area, and |n|₁ is 3/2 on average over all directions. Blocks with points
+/// beyond those explained by the area are small scattered pieces, each as large as a point's ball. The box is
+/// the upper limit.
 Blocks count_blocks(double with_points, const BandSize& layer, double edge) {
   const double volume = edge * edge * edge;
-  // Blocks with points that the area explains: those that a layer without thickness meets (t = 0).
+  // Blocks with points that the area explains: a layer without thickness (t = 0).
   const double bare = layer.surface * 1.5 * edge / volume;
   Blocks blocks;
   blocks.along_surface = layer.surface * (1.5 * edge + layer.thickness) / volume;
@@ -169,7 +169,7 @@ std::optional<std::uint64_t> number_in(const std::string& path) {
   return std::nullopt;
 }
 
-/// Value of the line "name[:] value" of a file such as /proc/meminfo.
+/// Returns the value of the line "name[:] value" of a file such as /proc/meminfo.
 std::optional<std::uint64_t> field_of(const std::string& path, const std::string& name) {
   std::ifstream file(path);
   std::string word;
@@ -184,7 +184,8 @@ std::optional<std::uint64_t> field_of(const std::string& path, const std::string
   return std::nullopt;
 }
 
-/// What a control group has left: its limit less its use, where page cache that can be dropped is not use.
+/// Returns the memory left in a control group: its limit minus its use, not counting page cache that can be
+/// dropped.
 std::optional<std::uint64_t> left_in_group(const std::string& limit_file, const std::string& usage_file,
                                            const std::string& stat_file, const std::string& cache_field) {
   const auto limit = number_in(limit_file);
@@ -195,7 +196,8 @@ std::optional<std::uint64_t> left_in_group(const std::string& limit_file, const 
   return *limit > used ? *limit - used : 0;
 }
 
-/// What a limit of this process leaves; `use` is the line of /proc/self/status that counts against it.
+/// Returns the memory left under a limit of this process; `use` is the line of /proc/self/status that counts
+/// against it.
 std::optional<std::uint64_t> left_of_limit(int resource, const std::string& use) {
   struct rlimit limit = {};
   if (getrlimit(static_cast<__rlimit_resource_t>(resource), &limit) != 0 || limit.rlim_cur == RLIM_INFINITY)
@@ -230,7 +232,7 @@ void check_coordinates(const PolygonMesh& mesh, const Bounds& box, double voxel_
 
 BandEstimate estimate(const PolygonMesh& mesh, const Measured& measured, double voxel_size,
                       double exterior_band, double interior_band) {
-  // The band lies around the surface on both sides, and one more sample where its ends fall between samples.
+  // The band lies around the surface on both sides, plus one sample where its ends fall between samples.
   const double reach = 2.0 * std::max(exterior_band, interior_band) + 1.0;
   const BandSize layer{measured.area / voxel_size / voxel_size, exterior_band + interior_band,
                        measured.box.size() / voxel_size + Eigen::Vector3d::Constant(reach)};
@@ -239,9 +241,8 @@ BandEstimate estimate(const PolygonMesh& mesh, const Measured& measured, double 
   const auto [small, middle, large] = blocks_with_points(mesh, voxel_size);
   const Blocks leaves = count_blocks(small, layer, 8.0);
   estimate.leaves = leaves.all;
-  // The least of three counts: the filled box, all samples of the leaves, and the band's own
-  // volume with scattered pieces.
-  // A piece far below a voxel is a ball of the exterior band's radius.
+  // The least of three counts: the filled box, all samples of the leaves, and the band's own volume with
+  // scattered pieces. A piece far below a voxel is a ball of the exterior band's radius.
   const double ball = 4.0 / 3.0 * std::numbers::pi * std::pow(exterior_band, 3);
   estimate.active_voxels = std::min(
       {layer.sides.prod(), 512.0 * leaves.all, layer.thickness * layer.surface + leaves.scattered * ball});
@@ -260,11 +261,11 @@ BandEstimate estimate_band(const PolygonMesh& mesh, double voxel_size, double ex
 }
 
 std::optional<std::uint64_t> available_memory() {
-  // The machine's own figure is in units of 1024 bytes.
+  // In units of 1024 bytes.
   std::optional<std::uint64_t> available = field_of("/proc/meminfo", "MemAvailable");
   if (available) *available *= 1024;
-  // Control groups of version 2, then of version 1, then this process's limits: the least of all that are set
-  // holds.
+  // Control groups of version 2, then of version 1, then this process's limits: the least of all that are
+  // set.
   const std::string root = "/sys/fs/cgroup/";
   for (const auto& left :
        {left_in_group(root + "memory.max", root + "memory.current", root + "memory.stat", "inactive_file"),
@@ -284,8 +285,7 @@ void check_fits_memory(double bytes, const std::string& what) {
 
 void check_voxelization_fits(const PolygonMesh& mesh, double voxel_size, double exterior_band,
                              double interior_band) {
-  // In this order each check can rely on those before: the estimate divides by the voxel size and takes
-  // finite corners.
+  // In this order each check can rely on the previous ones.
   check_arguments(voxel_size, exterior_band, interior_band);
   if (mesh.empty()) throw Error("The mesh holds no polygon to voxelize.");
   const Measured measured = measure(mesh);

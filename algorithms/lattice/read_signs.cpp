@@ -9,25 +9,23 @@ namespace {
 
 using namespace simd;
 
-// A comparison of magnitudes as whole numbers finds what is no number: with the sign bit cleared, floats are
+// A comparison of magnitudes as integers finds infinity and NaN: with the sign bit cleared, floats are
 // ordered as their bits are, and infinity and all NaNs come after the largest finite number.
 //
-// A sample is compared with the isovalue instead of signed_value() with 0. Both decide alike, because the
-// difference of two floats that are not equal is never rounded to 0; and where greater is inside, the
-// comparison is turned about.
+// A sample is compared with the isovalue instead of signed_value() with 0. Both agree, because the difference
+// of two different floats is never rounded to 0; and if greater is inside, the comparison is reversed.
 
 bool read_leaf(const float* values, const InsideRule& rule, std::uint64_t* inside) {
   constexpr std::int32_t kMagnitude = 0x7fffffff, kLargestFinite = 0x7f7fffff;
   const Floats iso = all(rule.isovalue);
-  // The greatest magnitude of each lane is enough: one comparison after the loop tells whether any was not
-  // finite.
+  // The greatest magnitude of each lane suffices for the test after the loop.
   Ints greatest{};
-  // A word is a layer along x: 64 samples in a row of memory, whose comparisons are its bits in order.
+  // A word is a layer along x: 64 consecutive samples, whose comparisons are its bits in order.
   for (int word = 0; word < 8; ++word) {
     std::uint64_t bits = 0;
     for (int i = 0; i < 64; i += kLanes) {
       const Floats v = load(values + 64 * word + i);
-      // Comparisons are ordered: what is no number counts as outside here, and the leaf is refused for it.
+      // Comparisons are ordered: NaN counts as outside here, and the leaf is refused for it.
       bits |= std::uint64_t{rule.scale > 0 ? less(v, iso) : less(iso, v)} << i;
       const Ints size = (Ints)v & kMagnitude;
       greatest = greatest > size ? greatest : size;
@@ -37,8 +35,7 @@ bool read_leaf(const float* values, const InsideRule& rule, std::uint64_t* insid
   return !any(greatest > kLargestFinite);
 }
 
-// Rows are read for layers of edges across leaves. Nobody looks for samples that are not finite here;
-// read_leaf() does.
+// Rows are read for layers of edges across leaves. Samples that are not finite are found by read_leaf().
 std::uint64_t read_rows(const float* values, std::size_t stride, const InsideRule& rule) {
   const Floats iso = all(rule.isovalue);
   std::uint64_t bits = 0;

@@ -10,7 +10,7 @@
 #include "algorithms/voxelization/voxelize_for_tests.h"
 
 namespace hermesh {
-namespace {
+namespace bounded_remesh_test {
 
 using Eigen::Vector3d;
 using voxelize_for_tests::sphere;
@@ -30,7 +30,7 @@ double from_box(const Vector3d& p, const Vector3d& low, const Vector3d& high) {
   return -outside.maxCoeff();
 }
 
-/// Calls f with places spread over each triangle.
+/// Calls f with positions distributed over each triangle.
 template <class F>
 void for_each_place(const PolygonMesh& mesh, int n, F&& f) {
   for (const Triangle& t : mesh.triangles)
@@ -45,45 +45,70 @@ BoundedMesh remesh(const PolygonMesh& mesh, const BoundedRemeshOptions& options)
   return bounded_remesh(mesh, options, context);
 }
 
+/// Remeshes within the error; expects both bounds to hold.
+BoundedMesh reached(const PolygonMesh& mesh, const BoundedRemeshOptions& options) {
+  BoundedMesh made = remesh(mesh, options);
+  EXPECT_TRUE(made.unmet.empty());
+  EXPECT_LE(made.to_surface, options.error);
+  EXPECT_LE(made.from_surface, options.error);
+  return made;
+}
+
+PolygonMesh turned(PolygonMesh mesh) {
+  const Eigen::Quaterniond turn = Eigen::Quaterniond(0.8, 0.3, -0.4, 0.33).normalized();
+  for (Eigen::Vector3f& p : mesh.points) p = (turn * p.cast<double>()).cast<float>();
+  return mesh;
+}
+
+/// Appends another mesh, optionally reversed.
+void append(PolygonMesh& mesh, const PolygonMesh& other, bool reversed = false) {
+  const auto first = std::uint32_t(mesh.points.size());
+  for (std::size_t i = 0; i < other.points.size(); ++i)
+    mesh.points.push_back((other.world(i) - mesh.origin).cast<float>());
+  for (const Triangle& t : other.triangles)
+    mesh.triangles.push_back({first + t[0], first + t[reversed ? 2 : 1], first + t[reversed ? 1 : 2]});
+}
+
+/// Removes the triangles in the plane z = 1.
+void open_lid(PolygonMesh& mesh) {
+  std::erase_if(mesh.triangles, [&](const Triangle& t) {
+    return std::all_of(t.begin(), t.end(), [&](std::uint32_t p) { return mesh.world(p).z() == 1.0; });
+  });
+}
+
+double nearest_vertex(const PolygonMesh& mesh, const Vector3d& at) {
+  double nearest = 1;
+  for (std::size_t i = 0; i < mesh.points.size(); ++i)
+    nearest = std::min(nearest, (mesh.world(i) - at).norm());
+  return nearest;
+}
+
 TEST(BoundedRemesh, ABoxIsKeptToTheErrorWithAFewTriangles) {
   const Vector3d low(0.1, -0.2, 0.3), high(1.1, 0.5, 0.9);
-  const BoundedMesh made = remesh(box(low, high), {.error = 0.02});
-  ASSERT_TRUE(made.unmet.empty());
-  EXPECT_LE(made.to_surface, 0.02);
-  EXPECT_LE(made.from_surface, 0.02);
+  const BoundedMesh made = reached(box(low, high), {.error = 0.02});
   EXPECT_LE(made.mesh.triangle_count(), 60u);
   EXPECT_GE(made.mesh.triangle_count(), 12u);
   double farthest = 0;
   for_each_place(made.mesh, 24,
                  [&](const Vector3d& p) { farthest = std::max(farthest, from_box(p, low, high)); });
   EXPECT_LE(farthest, made.to_surface);
-  // From each corner of the box some place of the mesh is no farther.
   for (int corner = 0; corner < 8; ++corner) {
     const Vector3d at(corner & 1 ? high.x() : low.x(), corner & 2 ? high.y() : low.y(),
                       corner & 4 ? high.z() : low.z());
-    double nearest = 1;
-    for (std::size_t i = 0; i < made.mesh.points.size(); ++i)
-      nearest = std::min(nearest, (made.mesh.world(i) - at).norm());
-    EXPECT_LE(nearest, 0.03);
+    EXPECT_LE(nearest_vertex(made.mesh, at), 0.03);
   }
 }
 
 TEST(BoundedRemesh, PlanePartsNeedFewVoxelsHoweverSmallTheError) {
   const PolygonMesh polygons = box(Vector3d(0, 0, 0), Vector3d(1, 1, 1));
   for (const double error : {0.02, 0.002, 0.0005}) {
-    const BoundedMesh made = remesh(polygons, {.error = error});
-    ASSERT_TRUE(made.unmet.empty());
+    const BoundedMesh made = reached(polygons, {.error = error});
     EXPECT_EQ(made.mesh.triangle_count(), 12u);
-    EXPECT_LE(made.to_surface, error);
-    EXPECT_LE(made.from_surface, error);
     EXPECT_GT(made.voxel_size, 0.01);
   }
   // Across the lattice, too.
-  PolygonMesh turned = box(Vector3d(0.1, -0.2, 0.3), Vector3d(1.1, 0.5, 0.9));
-  const Eigen::Quaterniond turn = Eigen::Quaterniond(0.8, 0.3, -0.4, 0.33).normalized();
-  for (Eigen::Vector3f& p : turned.points) p = (turn * p.cast<double>()).cast<float>();
-  const BoundedMesh made = remesh(turned, {.error = 0.01});
-  ASSERT_TRUE(made.unmet.empty());
+  const BoundedMesh made =
+      reached(turned(box(Vector3d(0.1, -0.2, 0.3), Vector3d(1.1, 0.5, 0.9))), {.error = 0.01});
   EXPECT_EQ(made.mesh.triangle_count(), 12u);
   EXPECT_GT(made.voxel_size, 0.04);
 }
@@ -91,27 +116,16 @@ TEST(BoundedRemesh, PlanePartsNeedFewVoxelsHoweverSmallTheError) {
 TEST(BoundedRemesh, WhatLargeVoxelsDoNotShowIsThereAllTheSame) {
   // A box with a shaft within, a sixtieth of it wide.
   PolygonMesh both = box(Vector3d(0, 0, 0), Vector3d(1, 0.7, 0.6));
-  const PolygonMesh shaft = box(Vector3d(0.4013, 0.3307, 0.2), Vector3d(0.4173, 0.3467, 0.5));
-  const auto first = std::uint32_t(both.points.size());
-  for (std::size_t i = 0; i < shaft.points.size(); ++i)
-    both.points.push_back((shaft.world(i) - both.origin).cast<float>());
-  // Facing inwards: a cavity.
-  for (const Triangle& t : shaft.triangles)
-    both.triangles.push_back({first + t[0], first + t[2], first + t[1]});
-  const BoundedMesh made = remesh(both, {.error = 0.004});
-  ASSERT_TRUE(made.unmet.empty());
-  double nearest = 1;
-  for (std::size_t i = 0; i < made.mesh.points.size(); ++i)
-    nearest = std::min(nearest, (made.mesh.world(i) - Vector3d(0.4013, 0.3307, 0.2)).norm());
-  EXPECT_LE(nearest, 0.0061);
+  append(both, box(Vector3d(0.4013, 0.3307, 0.2), Vector3d(0.4173, 0.3467, 0.5)), true);
+  const BoundedMesh made = reached(both, {.error = 0.004});
+  EXPECT_LE(nearest_vertex(made.mesh, Vector3d(0.4013, 0.3307, 0.2)), 0.0061);
 }
 
 TEST(BoundedRemesh, ASphereNeedsFewerTrianglesTheLargerTheError) {
   const PolygonMesh polygons = sphere(Vector3d(5, 5, 5), 1.0, 48);
   std::size_t before = 1u << 30;
   for (const double error : {0.015, 0.04, 0.1}) {
-    const BoundedMesh made = remesh(polygons, {.error = error});
-    ASSERT_TRUE(made.unmet.empty());
+    const BoundedMesh made = reached(polygons, {.error = error});
     for_each_place(made.mesh, 8, [&](const Vector3d& p) {
       // The polygons themselves lie up to 0.0022 within the sphere.
       EXPECT_LE(std::abs((p - Vector3d(5, 5, 5)).norm() - 1.0), error + 0.0022);
@@ -124,14 +138,9 @@ TEST(BoundedRemesh, ASphereNeedsFewerTrianglesTheLargerTheError) {
 TEST(BoundedRemesh, FacesWithinTheSolidDoNotCount) {
   // Of two boxes that overlap, the faces of each within the other bound nothing.
   PolygonMesh both = box(Vector3d(0, 0, 0), Vector3d(1, 1, 1));
-  const PolygonMesh other = box(Vector3d(0.5, 0.25, 0.25), Vector3d(1.5, 0.75, 0.75));
-  const auto first = std::uint32_t(both.points.size());
-  both.points.insert(both.points.end(), other.points.begin(), other.points.end());
-  for (const Triangle& t : other.triangles)
-    both.triangles.push_back({first + t[0], first + t[1], first + t[2]});
-  const BoundedMesh made = remesh(both, {.error = 0.03});
-  ASSERT_TRUE(made.unmet.empty());
-  // No place of the mesh is deep within either box.
+  append(both, box(Vector3d(0.5, 0.25, 0.25), Vector3d(1.5, 0.75, 0.75)));
+  const BoundedMesh made = reached(both, {.error = 0.03});
+  // No position of the mesh is deep within either box.
   for_each_place(made.mesh, 16, [&](const Vector3d& p) {
     const double in_first = std::min((p - Vector3d(0, 0, 0)).minCoeff(), (Vector3d(1, 1, 1) - p).minCoeff());
     const double in_other =
@@ -143,10 +152,7 @@ TEST(BoundedRemesh, FacesWithinTheSolidDoNotCount) {
 
 TEST(BoundedRemesh, AHoleIsRefusedWithItsPlaceUnlessItMayBeClosed) {
   PolygonMesh open = box(Vector3d(0, 0, 0), Vector3d(1, 1, 1));
-  // The lid at z = 1 goes.
-  std::erase_if(open.triangles, [&](const Triangle& t) {
-    return std::all_of(t.begin(), t.end(), [&](std::uint32_t p) { return open.world(p).z() == 1.0; });
-  });
+  open_lid(open);
   ASSERT_EQ(open.triangles.size(), 10u);
   const BoundedMesh refused = remesh(open, {.error = 0.05});
   ASSERT_FALSE(refused.unmet.empty());
@@ -158,8 +164,7 @@ TEST(BoundedRemesh, AHoleIsRefusedWithItsPlaceUnlessItMayBeClosed) {
   EXPECT_LT(at.x(), 1.0);
   EXPECT_NE(explanation(refused).find("hole"), std::string::npos);
 
-  const BoundedMesh closed = remesh(open, {.error = 0.05, .over_holes = true});
-  ASSERT_TRUE(closed.unmet.empty());
+  const BoundedMesh closed = reached(open, {.error = 0.05, .over_holes = true});
   EXPECT_GT(closed.hole_area, 0.5);
   EXPECT_FALSE(closed.mesh.empty());
 }
@@ -171,8 +176,7 @@ TEST(BoundedRemesh, AWallTooThinIsRefusedWithItsThickness) {
   EXPECT_EQ(refused.unmet.front().why, Unmet::thin);
   EXPECT_NEAR(refused.thickness, 0.0004, 1e-6);
   // With voxels as small as the wall is thick it is there.
-  const BoundedMesh made = remesh(box(Vector3d(0, 0, 0.01), Vector3d(1, 1, 0.02)), {.error = 0.05});
-  ASSERT_TRUE(made.unmet.empty());
+  const BoundedMesh made = reached(box(Vector3d(0, 0, 0.01), Vector3d(1, 1, 0.02)), {.error = 0.05});
   EXPECT_LE(made.voxel_size, 0.02);
 }
 
@@ -181,9 +185,7 @@ TEST(BoundedRemesh, AWallTooThinIsRefusedWithItsThickness) {
 PolygonMesh box_with_fin(double height) {
   const double width = 0.83;
   PolygonMesh mesh = box(Vector3d(0, 0, 0), Vector3d(1, width, 1));
-  std::erase_if(mesh.triangles, [&](const Triangle& t) {
-    return std::all_of(t.begin(), t.end(), [&](std::uint32_t p) { return mesh.world(p).z() == 1.0; });
-  });
+  open_lid(mesh);
   const auto add = [&](const Vector3d& p) {
     mesh.points.push_back((p - mesh.origin).cast<float>());
     return std::uint32_t(mesh.points.size() - 1);
@@ -222,9 +224,7 @@ TEST(BoundedRemesh, AFinIsRefusedAtOnceWithItsThickness) {
 }
 
 TEST(BoundedRemesh, AFinThatIsShallowerThanTheErrorNeedNotBeShown) {
-  const BoundedMesh made = remesh(box_with_fin(0.03), {.error = 0.05});
-  ASSERT_TRUE(made.unmet.empty()) << explanation(made);
-  EXPECT_LE(made.from_surface, 0.05);
+  const BoundedMesh made = reached(box_with_fin(0.03), {.error = 0.05});
   EXPECT_GT(made.voxel_size, 2e-3);
 }
 
@@ -242,7 +242,8 @@ TEST(BoundedRemesh, ABudgetIsKept) {
   }
 }
 
-/// A prism over a star of so many points, turned: plane parts only, and no edge along the lattice.
+/// A rotated prism over a star with the requested number of points: only plane parts, and no edge along the
+/// lattice.
 PolygonMesh turned_star(int points) {
   PolygonMesh mesh;
   const Eigen::Quaterniond turn = Eigen::Quaterniond(0.8, 0.3, -0.4, 0.33).normalized();
@@ -263,22 +264,19 @@ PolygonMesh turned_star(int points) {
 }
 
 TEST(BoundedRemesh, ABudgetEndsAtOnceWhereFewerTrianglesAreExact) {
-  PolygonMesh turned = box(Vector3d(0.1, -0.2, 0.3), Vector3d(1.1, 0.5, 0.9));
-  const Eigen::Quaterniond turn = Eigen::Quaterniond(0.8, 0.3, -0.4, 0.33).normalized();
-  for (Eigen::Vector3f& p : turned.points) p = (turn * p.cast<double>()).cast<float>();
   for (const PolygonMesh& polygons :
-       {box(Vector3d(-1, -1, -1), Vector3d(1, 1, 1)), box(Vector3d(0, 0, 0), Vector3d(2, 3, 4)), turned})
-    for (const std::size_t budget : {500u}) {
-      RunContext context;
-      const BoundedMesh made = remesh_to_budget(polygons, budget, {.most_points = 1e6}, context);
-      ASSERT_TRUE(made.unmet.empty());
-      EXPECT_EQ(made.mesh.triangle_count(), 12u);
-      EXPECT_LE(std::max(made.to_surface, made.from_surface), 2e-4 * bounds(polygons).size().norm());
-    }
+       {box(Vector3d(-1, -1, -1), Vector3d(1, 1, 1)), box(Vector3d(0, 0, 0), Vector3d(2, 3, 4)),
+        turned(box(Vector3d(0.1, -0.2, 0.3), Vector3d(1.1, 0.5, 0.9)))}) {
+    RunContext context;
+    const BoundedMesh made = remesh_to_budget(polygons, 500, {.most_points = 1e6}, context);
+    ASSERT_TRUE(made.unmet.empty());
+    EXPECT_EQ(made.mesh.triangle_count(), 12u);
+    EXPECT_LE(std::max(made.to_surface, made.from_surface), 2e-4 * bounds(polygons).size().norm());
+  }
 }
 
 TEST(BoundedRemesh, ATryThatFailsLosesNothing) {
-  // Voxels that would show more of such a small object are smaller than the smallest that there are.
+  // Voxels small enough to show more of such a small object are below the smallest permitted voxel size.
   for (const double scale : {1.0, 1e-2, 1e-3, 3e-4}) {
     SCOPED_TRACE(scale);
     PolygonMesh polygons = turned_star(9);
@@ -320,5 +318,5 @@ TEST(BoundedRemesh, SameBytesAtAnyThreadCount) {
   EXPECT_EQ(made[0], made[2]);
 }
 
-}  // namespace
+}  // namespace bounded_remesh_test
 }  // namespace hermesh

@@ -15,17 +15,17 @@
 namespace hermesh {
 namespace {
 
-/// Share of the extent that no error is below, for up to 3e5 triangles. A mesh with this bound is the
-/// polygons, except for the rounding of single precision.
+/// Least error as a share of the extent, for up to 3e5 triangles: a mesh with this bound equals the polygons,
+/// except for the rounding of single precision.
 constexpr double kExact = 1e-5;
-/// Errors, as shares of the extent, and points at most of tries whose mesh is mostly exact if all parts are
-/// plane. Large voxels are enough for these.
+/// Errors, as shares of the extent, and most vertices of tries whose mesh is mostly exact if all parts are
+/// plane. Large voxels suffice for these.
 constexpr std::array<double, 3> kPlaneErrors = {6e-3, 1e-3, 1e-4};
 constexpr double kPointsOfPlane = 1e5;
-/// What a try that ends with an error counts for.
+/// Work that a try counts for if it throws.
 constexpr double kWorkOfFailure = 3e5;
 
-/// Runs tries and keeps the best mesh, with the notes and figures of the run that made it.
+/// Runs tries and stores the best mesh, with the notes and figures of its run.
 class Tries {
  public:
   Tries(const PolygonMesh& mesh, std::size_t triangles, RunContext& context)
@@ -37,7 +37,7 @@ class Tries {
 
   enum class Outcome { fits, too_many, refused };
 
-  /// Remeshes within the error. A failure is no more than a try that did not fit, unless all fail.
+  /// Remeshes within the error. A failure counts as a try that did not fit, unless all fail.
   Outcome run(const BoundedRemeshOptions& options) {
     const Numbered numbered(context_, ++tries_);
     context_.notes.resize(notes_);
@@ -64,14 +64,14 @@ class Tries {
     }
   }
 
-  /// Triangles of the last mesh.
+  /// Returns the triangles of the last mesh.
   double count() const { return double(count_); }
-  /// Larger bound of the best mesh, each way, which may be far below the error that was asked for.
+  /// Returns the two-sided bound of the best mesh, which may be far below the requested error.
   double best_bound() const { return std::max(best_->to_surface, best_->from_surface); }
   bool has_best() const { return best_.has_value(); }
   bool is_out_of_work() const { return work_ > kBudgetWork; }
 
-  /// Returns the best mesh, or why there is none. @throws Error
+  /// Returns the best mesh, or a refused one. @throws Error
   BoundedMesh result() {
     if (best_) {
       context_.notes = std::move(best_notes_);
@@ -85,7 +85,7 @@ class Tries {
   }
 
  private:
-  /// Puts the number of the try before the names of its stages in reports of progress, while it lives.
+  /// While it exists, prefixes the names of stages in progress reports with the number of the try.
   class Numbered {
    public:
     Numbered(RunContext& context, int number) : context_(context), on_progress_(context.on_progress) {
@@ -109,7 +109,7 @@ class Tries {
   int tries_ = 0;
   double work_ = 0.0;
   RunContext& context_;
-  std::size_t notes_, figures_;  ///< how many there were before
+  std::size_t notes_, figures_;  ///< numbers before the first try
   std::optional<BoundedMesh> best_, refused_;
   std::exception_ptr failure_;
   std::vector<std::string> best_notes_;
@@ -124,8 +124,8 @@ BoundedMesh remesh_to_budget(const PolygonMesh& mesh, std::size_t triangles,
   using Outcome = Tries::Outcome;
   const double extent = bounds(mesh).size().norm();
   const double exact = std::min(kExact, 3.0 / double(triangles)) * extent;
-  // On a smooth surface the triangles are in inverse proportion to the error; a sphere's 0.01 of the extent
-  // needs some hundreds.
+  // On a smooth surface the number of triangles is inversely proportional to the error; a sphere at 0.01 of
+  // the extent needs some hundreds.
   BoundedRemeshOptions now = options;
   now.error = std::clamp(3.0 * extent / double(triangles), 1e-5 * extent, 0.1 * extent);
   double too_small = 0.0, enough = std::numeric_limits<double>::infinity();
@@ -138,7 +138,7 @@ BoundedMesh remesh_to_budget(const PolygonMesh& mesh, std::size_t triangles,
     plane.most_points = std::min(plane.most_points, kPointsOfPlane);
     return tries.run(plane);
   };
-  // The polygons themselves may be few enough, and plane parts all there is.
+  // The polygons themselves may be few enough, and all parts plane.
   if (mesh.triangle_count() <= triangles)
     for (const double share : kPlaneErrors)
       if (run_plane(share) == Outcome::fits && tries.best_bound() <= exact) return tries.result();
@@ -147,7 +147,7 @@ BoundedMesh remesh_to_budget(const PolygonMesh& mesh, std::size_t triangles,
     double count = tries.count();
     if (outcome == Outcome::refused) {
       if (tries.has_best()) break;
-      // A larger error may be kept where this one is not: what is thin then need not show.
+      // A larger error may succeed, because thin parts then need not show.
       too_small = now.error;
       if (too_small >= 0.5 * extent) break;
       now.error =
@@ -156,13 +156,12 @@ BoundedMesh remesh_to_budget(const PolygonMesh& mesh, std::size_t triangles,
     }
     if (outcome == Outcome::fits) {
       enough = now.error;
-      // Smooth surfaces need triangles in inverse proportion to the error, and plane ones the same number for
-      // any.
+      // Unlike smooth surfaces, plane ones need the same number of triangles for any error.
       const bool may_be_plane = count * std::sqrt(now.error) < count_before * std::sqrt(error_before);
       if (may_be_plane && tries.best_bound() > exact && now.error > kPlaneErrors.back() * extent &&
           run_plane(kPlaneErrors.back()) == Outcome::fits) {
         enough = now.error = kPlaneErrors.back() * extent;
-        // No more triangles for an error that is many times smaller: no other part is left.
+        // The same number for an error many times smaller: all parts are plane.
         if (std::exchange(count, tries.count()) == tries.count()) break;
       }
       if (tries.best_bound() <= exact || count >= 0.9 * double(triangles)) break;
@@ -171,8 +170,7 @@ BoundedMesh remesh_to_budget(const PolygonMesh& mesh, std::size_t triangles,
       too_small = now.error;
     }
     if (too_small >= 0.5 * extent) break;
-    // The law of inverse proportion, within what earlier tries leave open; where it leads out of that, their
-    // middle.
+    // Inverse proportion, within the interval that earlier tries leave; otherwise the interval's middle.
     double next = now.error * std::clamp(count / (0.95 * double(triangles)), 0.1, 10.0);
     if (next <= too_small || next >= enough)
       next = std::isfinite(enough) ? std::sqrt(too_small * enough) : 2.0 * too_small;

@@ -76,7 +76,7 @@ std::vector<Corners> cut(const Corners& c, double limit) {
     const Vector3d middle = 0.5 * (from + to);
     return {Corners{apex, from, middle}, Corners{apex, middle, to}};
   }
-  // So that the diagonals of slices are no longer than the limit, or the slices are square.
+  // The diagonals of slices are no longer than the limit, or the slices are square.
   const double width = std::max(std::sqrt(std::max(0.0, limit * limit - height * height)), height);
   const double foot = std::clamp((apex - from).dot(to - from) / (length * length), 0.0, 1.0);
   std::vector<Corners> parts;
@@ -134,12 +134,14 @@ ShownSurface::Verdict ShownSurface::look(const Vector3d& at, const Vector3d& nor
     hidden |= value < 0.0 && -value > away.norm() + kDepthSlack;
   }
   if (hidden) return Verdict::hidden;
-  // The distances are those to this plane: the cell's surface is that of the place.
+  // The distances are those to this plane, which is the cell's surface.
   if ((with || against) && inside_somewhere && outside_somewhere) return Verdict::shown;
   if (!mesh_shows(at, normal, limit, aligned)) return Verdict::lost;
   return is_pierced(at, normal, samples) ? Verdict::pierced : Verdict::shown;
 }
 
+/// Returns true if an edge of the cell around a position has both ends outside, on different sides of its
+/// plane.
 bool ShownSurface::is_pierced(const Vector3d& at, const Vector3d& normal, Samples& samples) const {
   const openvdb::Coord cell = cell_of(at);
   bool before[8], behind[8];
@@ -179,22 +181,14 @@ bool ShownSurface::mesh_shows(const Vector3d& at, const Vector3d& normal, double
   return shown;
 }
 
-Near::Near(const std::vector<LostPiece>& places, double distance) {
-  for (const LostPiece& piece : places) add(piece.at, distance);
-  cells_.voxelizeActiveTiles();
-}
-
 Near::Near(const std::vector<Vector3d>& places, double distance) {
-  for (const Vector3d& p : places) add(p, distance);
+  const Vector3d reach = Vector3d::Constant(distance);
+  for (const Vector3d& p : places)
+    cells_.fill(openvdb::CoordBBox(cell_of(p - reach), cell_of(p + reach)), true);
   cells_.voxelizeActiveTiles();
 }
 
 bool Near::holds(Reader& reader, const Vector3d& p) { return reader.isValueOn(cell_of(p)); }
-
-void Near::add(const Vector3d& p, double distance) {
-  const Vector3d reach = Vector3d::Constant(distance);
-  cells_.fill(openvdb::CoordBBox(cell_of(p - reach), cell_of(p + reach)), true);
-}
 
 SurfaceComparison compare_with_solid(const PolygonMesh& mesh, const ShownSurface& shown, double voxel_size,
                                      RunContext& context) {
@@ -225,18 +219,18 @@ SurfaceComparison compare_with_solid(const PolygonMesh& mesh, const ShownSurface
   return all;
 }
 
-std::vector<LostPiece> lost_after_thickening(const PolygonMesh& mesh, const ShownSurface& shown,
-                                             double voxel_size, const Near& around, RunContext& context) {
-  using Part = std::vector<LostPiece>;
+std::vector<Vector3d> lost_after_thickening(const PolygonMesh& mesh, const ShownSurface& shown,
+                                            double voxel_size, const Near& around, RunContext& context) {
+  using Part = std::vector<Vector3d>;
   const auto parts = over_pieces<Part>(
       mesh, voxel_size, context, [&] { return std::pair(shown.samples(), around.reader()); },
-      [&](Part& part, const Corners& piece, std::uint32_t t, const Vector3d& normal,
+      [&](Part& part, const Corners& piece, std::uint32_t, const Vector3d& normal,
           std::pair<ShownSurface::Samples, Near::Reader>& state) {
         const Vector3d at = centre(piece);
         if (Near::holds(state.second, at) &&
             shown.look(at, normal, kShownByShell, 0.0, state.first) == ShownSurface::Verdict::lost &&
             !shown.is_all(true, at))
-          part.push_back({at, normal, t, area_of(piece)});
+          part.push_back(at);
       });
   Part all;
   for (const Part& part : parts) all.insert(all.end(), part.begin(), part.end());

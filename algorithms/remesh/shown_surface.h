@@ -59,8 +59,7 @@ class ShownSurface {
 
   enum class Verdict : std::uint8_t {
     shown,
-    pierced,  ///< shown, but an edge of the lattice with both ends outside passes through: a wall may have a
-              ///< hole here
+    pierced,  ///< shown, but a lattice edge with both ends outside passes through: maybe a hole of a wall
     hidden,
     lost
   };
@@ -69,10 +68,6 @@ class ShownSurface {
   /// the solid.
   Verdict look(const Eigen::Vector3d& at, const Eigen::Vector3d& normal, double limit, double aligned,
                Samples& samples) const;
-
-  /// Returns true if an edge of the cell around a position has both ends outside, on different sides of its
-  /// plane.
-  bool is_pierced(const Eigen::Vector3d& at, const Eigen::Vector3d& normal, Samples& samples) const;
 
   /// Returns true if all eight samples around a position are on the given side.
   bool is_all(bool inside, const Eigen::Vector3d& at) const;
@@ -83,6 +78,8 @@ class ShownSurface {
                   double aligned) const;
 
  private:
+  bool is_pierced(const Eigen::Vector3d& at, const Eigen::Vector3d& normal, Samples& samples) const;
+
   const openvdb::FloatGrid& grid_;
   double voxel_size_;
   PolygonMesh mesh_;
@@ -101,15 +98,12 @@ struct LostPiece {
 /// A set of voxels that contains all positions within a distance of some others.
 class Near {
  public:
-  Near(const std::vector<LostPiece>& places, double distance);
   Near(const std::vector<Eigen::Vector3d>& places, double distance);
   using Reader = openvdb::tree::ValueAccessor<const openvdb::MaskTree>;
   Reader reader() const { return Reader(cells_); }
   static bool holds(Reader& reader, const Eigen::Vector3d& p);
 
  private:
-  void add(const Eigen::Vector3d& p, double distance);
-
   openvdb::MaskTree cells_;
 };
 
@@ -117,7 +111,7 @@ class Near {
 struct SurfaceComparison {
   std::vector<LostPiece> lost, pierced;
   double area = 0.0;  ///< of all polygons
-  /// What look() returns for each piece of each task's triangles, in their order.
+  /// Results of look() for each piece of each task's triangles, in their order.
   std::vector<std::vector<ShownSurface::Verdict>> verdicts;
 };
 
@@ -126,9 +120,10 @@ struct SurfaceComparison {
 SurfaceComparison compare_with_solid(const PolygonMesh& mesh, const ShownSurface& shown, double voxel_size,
                                      RunContext& context);
 
-/// Returns the pieces near some positions that a solid with a shell around thin parts does not show either,
-/// by surface at the distance of the shell. Pieces in filled gaps do not count.
-std::vector<LostPiece> lost_after_thickening(const PolygonMesh& mesh, const ShownSurface& shown,
-                                             double voxel_size, const Near& around, RunContext& context);
+/// Returns the positions of the pieces near some positions that a solid with a shell around thin parts does
+/// not show either, by surface at the distance of the shell. Pieces in filled gaps do not count.
+std::vector<Eigen::Vector3d> lost_after_thickening(const PolygonMesh& mesh, const ShownSurface& shown,
+                                                   double voxel_size, const Near& around,
+                                                   RunContext& context);
 
 }  // namespace hermesh

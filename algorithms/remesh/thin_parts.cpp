@@ -17,7 +17,7 @@
 #include "algorithms/remesh/shown_surface.h"
 #include "algorithms/search/triangle_point.h"
 #include "algorithms/search/triangle_tree.h"
-#include "algorithms/voxelization/distance/segment.h"
+#include "algorithms/voxelization/distance/index_soup.h"
 #include "algorithms/voxelization/inside/orientation.h"
 
 namespace hermesh {
@@ -26,22 +26,21 @@ namespace {
 using Eigen::Vector3d;
 
 // All lengths are in voxels.
-constexpr double kAround = 3.0;        ///< how far from lost pieces thin walls are thickened, too
-constexpr double kOff = 1e-3;          ///< where rays begin, and how far inside samples are for certain
+constexpr double kAround = 3.0;        ///< distance from lost pieces within which thin walls are thickened
+constexpr double kBeside = 0.5;        ///< the same for pieces that a shell does not show
+constexpr double kBesideCrumbs = 1.5;  ///< the same for parts that came apart
+constexpr double kOff = 1e-3;          ///< start of rays, and margin of samples that are certainly inside
 constexpr double kWideGap = 1.0;       ///< gaps from here on are shown by the samples in every position
-constexpr double kBeside = 0.5;        ///< the same for what a shell does not show
-constexpr double kBetween = 0.1;       ///< how much farther places between those that are looked at may be
-constexpr double kBesideCrumbs = 1.5;  ///< the same for what came apart
-constexpr std::uint32_t kCrumb = 64;   ///< samples of what may have come apart at most
-constexpr double kFar = 1.4;  ///< what is farther from all surface has vanished, not only its outermost part
-constexpr double kLittleLost =
-    0.01;                          ///< share of the area up to which it may be edges and tips that are lost
-constexpr double kParallel = 0.9;  ///< cosine up to which the sides of a wall count as parallel
-constexpr double kAlong = 0.7;     ///< the same for a sheet that goes on
+constexpr double kBetween = 0.1;       ///< excess of the distance between the positions that are tested
+constexpr std::uint32_t kCrumb = 64;   ///< most samples of a part that may have come apart
+constexpr double kFar = 1.4;           ///< a part farther from all surface has vanished completely
+constexpr double kLittleLost = 0.01;   ///< share of the area up to which only edges and tips may be lost
+constexpr double kParallel = 0.9;      ///< cosine up to which the sides of a wall count as parallel
+constexpr double kAlong = 0.7;         ///< the same for an open surface that continues
 constexpr double kDeep =
-    0.74;  ///< a position one voxel from a wall as thick as rays reach is farther than this from it
-constexpr double kNarrow = 0.8, kEdge = 0.35;  ///< steps along the surface that tell a wire from a sheet
-constexpr double kNoWall = 1e-3;               ///< a wall thinner than this has no thickness to speak of
+    0.74;  ///< a position one voxel from a wall as thick as rays reach is farther from it
+constexpr double kNarrow = 0.8, kEdge = 0.35;  ///< steps along the surface that distinguish wires
+constexpr double kNoWall = 1e-3;               ///< thinner walls have no thickness worth reporting
 constexpr double kNone = std::numeric_limits<double>::infinity();
 
 std::string short_text(double value) {
@@ -63,16 +62,16 @@ class Thickening {
 
   Corners corners(std::size_t t) const { return corners_of(mesh_, triangles_[t], voxel_size_); }
 
-  /// The width of what is on either side of a piece, and the radius that it needs.
+  /// The width of the wall or gap at a piece, and the radius of the shell that it needs.
   struct Need {
     double radius = 0.0;
-    double inset = 0.0;   ///< how far from the piece along its normal the shell's middle is
-    double wall = kNone;  ///< thickness of the wall that is thickened; 0 for a sheet
-    bool is_gap = false;  ///< it is there to fill a gap
+    double inset = 0.0;   ///< offset of the shell's middle from the piece along its normal
+    double wall = kNone;  ///< thickness of the wall that is thickened; 0 for an open surface
+    bool is_gap = false;  ///< it fills a gap
   };
-  /// What a shell is for: to show the pieces, to join what came apart at the border of a sheet, or to show
-  /// what the first shell does not.
-  enum class Mode { sheets, rims, wires };
+  /// Purpose of a shell: to show the pieces, to join parts that came apart at the boundary of an open
+  /// surface, or to show pieces that the first shell does not.
+  enum class Mode { first, boundaries, wires };
   Need need(const Corners& piece, const Vector3d& normal, std::uint32_t triangle, bool is_lost, Mode mode,
             const ShownSurface& shown) const {
     const Vector3d at = centre(piece), outwards = turn(triangle) * normal;
@@ -88,7 +87,7 @@ class Thickening {
     } else if (ahead.faces_here) {
       wall = ahead.distance;
       inwards = outwards;
-    } else if (is_lost && (has_free_sides(at, outwards) || continues_a_sheet(at, normal, shown))) {
+    } else if (is_lost && (has_free_sides(at, outwards) || continues_open_surface(at, normal, shown))) {
       wall = 0.0;
     }
     if (std::isfinite(wall)) {
@@ -96,10 +95,10 @@ class Thickening {
       double radius = kShellRadius;
       if (mode == Mode::wires || is_wire(at + within, normal, 0.5 * wall))
         radius = kWireRadius;
-      else if (mode == Mode::rims)
-        radius = std::max(radius, radius_at_rim(piece, within));
+      else if (mode == Mode::boundaries)
+        radius = std::max(radius, radius_at_boundary(piece, within));
       result.radius = std::max(0.0, radius - 0.5 * wall);
-      // The wall is thick enough for the samples, but not part of the solid, e.g. between two open sheets.
+      // The wall is thick enough for the samples, but not part of the solid, e.g. between two open surfaces.
       if (is_lost && !(result.radius > 0.0) && shown.is_all(false, at + within)) {
         result.radius = 0.5 * wall;
         result.inset = within.dot(normal);
@@ -113,14 +112,14 @@ class Thickening {
     return result;
   }
 
-  /// Returns true if a piece is part of a wall that is thinner than a voxel, or of a sheet if these count,
-  /// and not near its border.
+  /// Returns true if a piece is part of a wall that is thinner than a voxel, or of an open surface if these
+  /// count, and not near its boundary.
   bool is_amid_wall(const Vector3d& at, const Vector3d& normal, std::uint32_t triangle,
-                    bool sheets_count) const {
+                    bool open_counts) const {
     const Vector3d inwards = -turn(triangle) * normal;
     const Opposite behind = across(at, inwards)[0];
     if (behind.faces_away && !(behind.slope > kParallel && behind.distance < 1.0)) return false;
-    if (!behind.faces_away && !(sheets_count && has_free_sides(at, inwards))) return false;
+    if (!behind.faces_away && !(open_counts && has_free_sides(at, inwards))) return false;
     const double half_width = behind.faces_away ? 0.5 * behind.distance : 0.0;
     const Vector3d middle = at + half_width * inwards, u = normal.unitOrthogonal(), v = normal.cross(u);
     for (const auto& [x, y] : {std::pair{1.0, 0.0}, {0.0, 1.0}, {-1.0, 0.0}, {0.0, -1.0}})
@@ -129,7 +128,7 @@ class Thickening {
   }
 
  private:
-  /// The next triangle along a ray: how far it is, and whether its outer side faces the ray's start.
+  /// The next triangle along a ray: its distance, and true if its outer side faces the ray's start.
   struct Opposite {
     double distance = kNone;  ///< infinite from 2 · kWireRadius on
     bool faces_here = false, faces_away = false;
@@ -182,24 +181,24 @@ class Thickening {
     return parts;
   }
 
-  /// 1 or −1, by which the normal of a triangle is turned outwards.
+  /// Returns 1 or −1, the factor that turns the normal of a triangle outwards.
   double turn(std::uint32_t triangle) const { return orientation_.turns[triangle] < 0 ? -1.0 : 1.0; }
 
-  /// Returns true if the solid is thick on one side of a piece. The orientation of a part may be wrong, so
-  /// both are tested.
+  /// Returns true if the solid is thick on one side of a piece. Both sides are tested, because the
+  /// orientation of a part may be wrong.
   static bool is_thick(const Vector3d& at, const Vector3d& normal, const ShownSurface& shown) {
     return shown.is_all(true, at - normal) || shown.is_all(true, at + normal);
   }
 
-  /// Returns true if there are no polygons one voxel away on either side. That is not so of the boundary of a
-  /// thick solid near its edges, nor of the rim of a wall.
+  /// Returns true if there are no polygons one voxel away on either side, unlike at the surface of a thick
+  /// solid near its edges and at the end of a wall.
   bool has_free_sides(const Vector3d& at, const Vector3d& normal) const {
     return is_free(at - normal, kDeep) && is_free(at + normal, kDeep);
   }
 
-  /// Returns true if a piece near a crease is part of a sheet: farther from the crease there is nothing on
-  /// either side.
-  bool continues_a_sheet(const Vector3d& at, const Vector3d& normal, const ShownSurface& shown) const {
+  /// Returns true if a piece near a crease is part of an open surface: farther from the crease both sides are
+  /// empty.
+  bool continues_open_surface(const Vector3d& at, const Vector3d& normal, const ShownSurface& shown) const {
     constexpr double kOnSheet = 0.5;
     const Vector3d u = normal.unitOrthogonal(), v = normal.cross(u);
     for (const double distance : {1.5, 3.0})
@@ -218,13 +217,12 @@ class Thickening {
     return false;
   }
 
-  /// Returns true if no triangle is within a distance of a place.
+  /// Returns true if no triangle is within a distance of a position.
   bool is_free(const Vector3d& at, double distance) const {
     return tree_.nearest(at, distance * distance, distance * distance).triangle == TriangleTree::kNone;
   }
 
-  /// Returns true where a thin part ends on both sides along at least two of four lines: it is a wire or a
-  /// speck.
+  /// Returns true if a thin part ends on both sides along at least two of four lines: a wire or a speck.
   bool is_wire(const Vector3d& at, const Vector3d& normal, double half_width) const {
     const Vector3d u = normal.unitOrthogonal(), v = normal.cross(u);
     const auto ends = [&](double x, double y) {
@@ -237,8 +235,9 @@ class Thickening {
     return ended >= 2;
   }
 
-  /// Where a sheet ends, the proof for wires holds, too: the sample nearest to each place has to be inside.
-  static double radius_at_rim(const Corners& c, const Vector3d& within) {
+  /// Returns the radius at the end of an open surface, where the proof for wires holds, too: the sample
+  /// nearest to each position has to be inside.
+  static double radius_at_boundary(const Corners& c, const Vector3d& within) {
     double farthest = 0.0;
     for (const Vector3d& p : {c[0], c[1], c[2], Vector3d(0.5 * (c[0] + c[1])), Vector3d(0.5 * (c[1] + c[2])),
                               Vector3d(0.5 * (c[2] + c[0])), centre(c)}) {
@@ -292,12 +291,12 @@ std::vector<Vector3d> crumbs(const openvdb::FloatGrid& grid) {
   return result;
 }
 
-/// What becomes of the pieces of some triangles.
+/// The shell around the pieces of some triangles, with statistics.
 struct Part {
   std::vector<ShellTriangle> shell;
   double area = 0.0, thickened_area = 0.0, merged_area = 0.0;  ///< voxels²
   double thickest = 0.0, thinnest = kNone;                     ///< voxels
-  bool has_sheets = false;
+  bool has_open = false;
 };
 
 /// Chooses the shell around the pieces near some positions, for the triangles of one task.
@@ -350,7 +349,7 @@ class ShellMaker {
 
   Sweep sweep_of_piece(const Corners& c, Part& part) {
     const ShownSurface::Verdict verdict = verdicts_[piece_++];
-    // A neighbour of a lost piece that shows may be a sheet of a solid that is there.
+    // A piece near a lost one may be shown, because it bounds a thick part of the solid.
     if (verdict == ShownSurface::Verdict::hidden || !Near::holds(around_, centre(c))) return {};
     const Thickening::Need need =
         thickening_.need(c, normal_, triangle_, verdict == ShownSurface::Verdict::lost, mode_, shown_);
@@ -359,7 +358,7 @@ class ShellMaker {
     (need.is_gap ? part.merged_area : part.thickened_area) += area;
     if (!need.is_gap) {
       part.thickest = std::max(part.thickest, 2.0 * (need.radius - std::abs(need.inset)));
-      part.has_sheets |= need.wall == 0.0;
+      part.has_open |= need.wall == 0.0;
       if (need.wall > 0.0) part.thinnest = std::min(part.thinnest, need.wall);
     }
     constexpr double kStep = 1.0 / 40.0;
@@ -370,15 +369,14 @@ class ShellMaker {
   const ShownSurface& shown_;
   Near::Reader around_;
   Thickening::Mode mode_;
-  const std::vector<ShownSurface::Verdict>&
-      verdicts_;  ///< of the pieces, in the order in which they are added
+  const std::vector<ShownSurface::Verdict>& verdicts_;  ///< of the pieces, in the order of addition
   std::size_t piece_ = 0;
   double voxel_size_;
   std::uint32_t triangle_ = 0;
   Vector3d normal_;
 };
 
-/// The level set of nothing, on the lattice of distances without sign.
+/// Returns the level set of an empty solid, on the lattice of unsigned distances.
 LevelSet nothing_on(const openvdb::FloatGrid& distances) {
   const auto grid = openvdb::FloatGrid::create(distances.background());
   grid->setName("sdf");
@@ -387,14 +385,18 @@ LevelSet nothing_on(const openvdb::FloatGrid& distances) {
   return make_level_set(grid);
 }
 
-/// Returns the lost pieces that are worth a shell. If more than kLittleLost of the area is lost, all are.
-/// Else those are that belong to a patch of lost pieces of which one is far from the solid's surface, or lies
-/// amid a wall, which has a hole there: what is left are the outermost parts of edges and tips.
-std::vector<LostPiece> worth_a_shell(const SurfaceComparison& all, const ShownSurface& shown,
-                                     const Thickening& thickening) {
+/// Returns the positions of the lost pieces that are worth a shell: all if more than kLittleLost of the area
+/// is lost; otherwise those of patches with a piece that is far from the solid's surface, or amid a wall,
+/// which has a hole there. The others are the outermost parts of edges and tips.
+std::vector<Vector3d> worth_a_shell(const SurfaceComparison& all, const ShownSurface& shown,
+                                    const Thickening& thickening) {
+  std::vector<Vector3d> result;
   double area = 0.0;
   for (const LostPiece& piece : all.lost) area += piece.area;
-  if (area > kLittleLost * all.area) return all.lost;
+  if (area > kLittleLost * all.area) {
+    for (const LostPiece& piece : all.lost) result.push_back(piece.at);
+    return result;
+  }
   // Patches are sets of pieces in neighbouring cells twice as large as voxels.
   std::map<std::array<int, 3>, std::uint32_t> cells;
   const auto cell_of = [](const Vector3d& at) {
@@ -413,9 +415,8 @@ std::vector<LostPiece> worth_a_shell(const SurfaceComparison& all, const ShownSu
     if (std::uint8_t& patch = counts[sets.find(cells.at(cell_of(piece.at)))]; !patch)
       patch = !shown.mesh_shows(piece.at, piece.normal, kFar, 0.0) ||
               thickening.is_amid_wall(piece.at, piece.normal, piece.triangle, true);
-  std::vector<LostPiece> result;
   for (const LostPiece& piece : all.lost)
-    if (counts[sets.find(cells.at(cell_of(piece.at)))]) result.push_back(piece);
+    if (counts[sets.find(cells.at(cell_of(piece.at)))]) result.push_back(piece.at);
   return result;
 }
 
@@ -429,13 +430,13 @@ std::optional<ThinParts> thicken(const PolygonMesh& mesh, SampledSolid& solid, T
   const SurfaceComparison comparison = compare_with_solid(mesh, shown, voxel_size, context);
   if (comparison.lost.empty() && comparison.pierced.empty()) return std::nullopt;
   const Thickening thickening(mesh, voxel_size);
-  std::vector<LostPiece> lost = worth_a_shell(comparison, shown, thickening);
-  // The border of a hole shows the polygons within it, if that is narrow.
+  std::vector<Vector3d> lost = worth_a_shell(comparison, shown, thickening);
+  // The boundary of a narrow hole shows the polygons within it.
   for (const LostPiece& piece : comparison.pierced)
-    if (thickening.is_amid_wall(piece.at, piece.normal, piece.triangle, false)) lost.push_back(piece);
+    if (thickening.is_amid_wall(piece.at, piece.normal, piece.triangle, false)) lost.push_back(piece.at);
   if (lost.empty()) return std::nullopt;
   if (rule == ThinRule::refuse) {
-    const Vector3d at = mesh.origin + voxel_size * lost.front().at;
+    const Vector3d at = mesh.origin + voxel_size * lost.front();
     throw Error("the polygons have parts that voxels of " + short_text(voxel_size) +
                 " do not show, such as at (" + short_text(at.x()) + ", " + short_text(at.y()) + ", " +
                 short_text(at.z()) + "); use smaller voxels, or keep thin parts, which thickens them");
@@ -444,7 +445,7 @@ std::optional<ThinParts> thicken(const PolygonMesh& mesh, SampledSolid& solid, T
   ThinParts sum;
   double thinnest = kNone;
   std::vector<ShellTriangle> shell;
-  // Adds the shell around the pieces that are near some places.
+  // Adds the shell around the pieces near some positions.
   const auto add = [&](const Near& around, Thickening::Mode mode) {
     std::vector<Part> parts((triangles.size() + kTrianglesPerTask - 1) / kTrianglesPerTask);
     parallel_blocks(parts.size(), context, [&](std::size_t chunk) {
@@ -456,10 +457,10 @@ std::optional<ThinParts> thicken(const PolygonMesh& mesh, SampledSolid& solid, T
     for (const Part& part : parts) {
       shell.insert(shell.end(), part.shell.begin(), part.shell.end());
       sum.thickest = std::max(sum.thickest, part.thickest * voxel_size);
-      sum.has_sheets |= part.has_sheets;
+      sum.has_open |= part.has_open;
       thinnest = std::min(thinnest, part.thinnest);
-      // Later shells are around pieces that have one already.
-      if (mode != Thickening::Mode::sheets) continue;
+      // Later shells surround pieces that already have one.
+      if (mode != Thickening::Mode::first) continue;
       sum.area += part.area * square;
       sum.thickened_area += part.thickened_area * square;
       sum.merged_area += part.merged_area * square;
@@ -473,7 +474,7 @@ std::optional<ThinParts> thicken(const PolygonMesh& mesh, SampledSolid& solid, T
   };
   using Mode = Thickening::Mode;
   const Near around_lost(lost, kAround);
-  add(around_lost, Mode::sheets);
+  add(around_lost, Mode::first);
   if (shell.empty()) return std::nullopt;
   join();
   const std::size_t first = shell.size();
@@ -482,7 +483,7 @@ std::optional<ThinParts> thicken(const PolygonMesh& mesh, SampledSolid& solid, T
       !still.empty())
     add(Near(still, kBeside), Mode::wires);
   if (const auto apart = crumbs(*solid.level_set.grid().grid); !apart.empty())
-    add(Near(apart, kBesideCrumbs), Mode::rims);
+    add(Near(apart, kBesideCrumbs), Mode::boundaries);
   if (shell.size() > first) join();
   return sum;
 }
@@ -507,7 +508,7 @@ std::string thin_note(const ThinParts& thin, double voxel_size) {
   std::string note;
   if (thin.thickened_area > 0.0) {
     note = share(thin.thickened_area) + " bounds walls that are thinner than voxels of " +
-           short_text(voxel_size) + " can show" + (thin.has_sheets ? ", or nothing at all" : "") +
+           short_text(voxel_size) + " can show" + (thin.has_open ? ", or nothing at all" : "") +
            ", and was thickened by up to " + short_text(thin.thickest);
     if (thin.thinnest_wall > kNoWall * voxel_size)
       note += "; voxels of " + short_text(thin.thinnest_wall) + " would show the thinnest wall";

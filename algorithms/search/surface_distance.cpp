@@ -13,20 +13,20 @@ namespace {
 
 using Corners = std::array<Eigen::Vector3d, 3>;
 
-// An end for what no search of this kind can tell, such as a place that is the limit away to the last digit.
+// Limits where no search of this kind can decide, such as at a point that is the limit away to the last
+// digit.
 constexpr std::size_t kMostPieces = 4'000'000;
 constexpr double kSmallestPiece = 1.0 / 4096.0;  // of the limit
-/// Points of a piece are looked at in rows: how far, in limits, a place may be from the nearest of them, the
-/// parts that a side has at most, and the least height of a piece, in its longest side, so that rows are no
-/// closer than need be.
+/// Points of a piece are tested in rows: largest distance of a point of the piece from the nearest of them,
+/// in limits; most parts of a side; and least height of a piece, in its longest side, so that rows are no
+/// closer than necessary.
 constexpr double kBetweenRows = 0.8;
 constexpr int kMostParts = 16;
 constexpr double kLeastHeight = 0.3;
-/// Sides of a triangle of the soup, in limits, from which on pieces are cut along them: pieces of about a
-/// limit in size hold anyway.
+/// Length of a side of a triangle of the soup, in limits, from which on pieces are divided along it: pieces
+/// of about a limit in size hold anyway.
 constexpr double kLongSide = 2.0;
-/// How far, in limits, a piece must reach over such a side, and how far it must lie within it, to be cut
-/// there.
+/// Distance, in limits, that a piece must extend over such a side, and within it, to be divided there.
 constexpr double kReachesOver = 1.0 / 64.0;
 
 double radius_about(const Eigen::Vector3d& middle, const Corners& piece) {
@@ -37,13 +37,13 @@ double radius_about(const Eigen::Vector3d& middle, const Corners& piece) {
 
 }  // namespace
 
-/// A part of a triangle, and the triangle of the soup that was nearest to what it is cut from.
+/// A part of a triangle, and the triangle of the soup that was nearest to its parent.
 struct SurfaceDistance::Piece {
   Corners corners;
   std::uint32_t nearest;
 };
 
-/// Looks at one triangle after another; each thread has its own, for the stack.
+/// Tests one triangle after another; each thread has its own, for the stack.
 class SurfaceDistance::Walk {
  public:
   Walk(const SurfaceDistance& surface, double limit, const Eigen::Vector3d& offset, const FreePieces& free,
@@ -56,17 +56,17 @@ class SurfaceDistance::Walk {
         free_(free),
         wanted_(wanted) {}
 
-  /// Whether each place of the triangle is within the limit; then `upper` is at least the largest distance,
-  /// else `far` has a place.
+  /// Returns true if each point of the triangle is within the limit; then `upper` is at least the largest
+  /// distance, else `far` has a point.
   bool holds(const Corners& triangle, double& upper, double& free_area, FarTriangle& far) {
-    // Neighbours are most often near the same triangle, though it is not the nearest to each.
+    // Neighbours are most often near the same triangle, even if it is not the nearest to each.
     stack_.assign(1, {triangle, wanted_ == Wanted::any_bound ? last_ : TriangleTree::kNone});
     std::size_t pieces = 0;
     while (!stack_.empty()) {
       if (pieces % 1024 == 0) context_.check();
       const Piece piece = stack_.back();
       stack_.pop_back();
-      // What was nearest to the whole is most often near its parts, which saves the search.
+      // The triangle nearest to the whole is most often near its parts, which saves the search.
       if (piece.nearest != TriangleTree::kNone && all_near(piece.corners, piece.nearest, upper)) continue;
       if (wanted_ == Wanted::any_bound && !is_large(piece.nearest) && all_near_in_rows(piece.corners, upper))
         continue;
@@ -74,7 +74,7 @@ class SurfaceDistance::Walk {
       const double radius = radius_about(middle, piece.corners);
       const NearestTriangle found = nearest(middle, piece.nearest, radius);
       const double distance = std::sqrt(found.squared);
-      // Nothing within twice the limit was found, or the middle itself is too far: no piece of it can hold.
+      // If nothing within twice the limit was found, or the middle is too far, no piece of it can hold.
       const bool is_far = found.triangle == TriangleTree::kNone || distance > limit_;
       if (!is_far) last_ = found.triangle;
       if (!is_far && distance + radius <= limit_) {
@@ -82,14 +82,13 @@ class SurfaceDistance::Walk {
         continue;
       }
       const bool is_last = ++pieces > kMostPieces || radius < kSmallestPiece * limit_;
-      // The last pieces where what is near meets what is free are a little too far, though their middles are
-      // not.
+      // The last pieces between near and free parts are a little too far, though their middles are not.
       if (free_.is_free && (is_last || (is_far && radius <= free_.radius)) && is_free(piece.corners)) {
         free_area +=
             0.5 * (piece.corners[1] - piece.corners[0]).cross(piece.corners[2] - piece.corners[0]).norm();
         continue;
       }
-      // What is far for certain may still be cut into pieces some of which are free.
+      // A piece that is certainly far may still contain free pieces.
       if (is_last || (is_far && (!free_.is_free || radius <= free_.radius))) {
         far.place = middle;
         far.distance = distance;
@@ -115,10 +114,10 @@ class SurfaceDistance::Walk {
     return true;
   }
 
-  /// Whether rows of points over a piece are so near, and so close to each other, that all of it is within
-  /// the limit: no place of a triangle is farther from the nearest of its corners than its circumradius. This
-  /// takes a quarter of the searches that halving does. False, soon, for what is too large, too slim or too
-  /// far for that.
+  /// Returns true if rows of points over a piece are so near, and so close to each other, that all of it is
+  /// within the limit: no point of a triangle is farther from the nearest of its corners than its
+  /// circumradius. This takes a quarter of the searches of bisection. False, soon, for pieces that are too
+  /// large, too slim or too far for that.
   bool all_near_in_rows(const Corners& piece, double& upper) {
     const Eigen::Vector3d u = piece[1] - piece[0], v = piece[2] - piece[0];
     const double a = u.norm(), b = v.norm(), c = (v - u).norm(), longest = std::max({a, b, c}),
@@ -140,8 +139,8 @@ class SurfaceDistance::Walk {
     return true;
   }
 
-  /// The triangle nearest to p, or one that is near enough for all about p. The distance to `known`, which is
-  /// near, saves most of the search.
+  /// Returns the triangle nearest to p, or one that is near enough for all about p. The distance to `known`,
+  /// which is near, saves most of the search.
   NearestTriangle nearest(const Eigen::Vector3d& p, std::uint32_t known, double radius) const {
     const double most = limit_ - radius,
                  enough = wanted_ == Wanted::any_bound && most > 0.0 ? most * most : -1.0;
@@ -166,10 +165,10 @@ class SurfaceDistance::Walk {
     return (b - a).squaredNorm() > least || (c - b).squaredNorm() > least || (a - c).squaredNorm() > least;
   }
 
-  /// Cuts a piece by the plane through a side of a triangle of the soup, upright on it, that it reaches over
-  /// most. What is over the triangle alone is then near it, so that a plane part is shown to be near another
-  /// by as many pieces as their triangles overlap in, however small the limit. False, and nothing cut, where
-  /// the triangle is small or too low under the piece.
+  /// Divides a piece by the perpendicular plane through the side of a triangle of the soup over which it
+  /// extends farthest. The part over the triangle is then near it, so that a plane part is shown to be near
+  /// another by as many pieces as their triangles overlap in, for any limit. Returns false, with nothing
+  /// divided, if the triangle is small or too far from the piece.
   bool cut_along(const Corners& piece, std::uint32_t triangle) {
     if (!is_large(triangle)) return false;
     const Corners at = {tree_.corner(triangle, 0), tree_.corner(triangle, 1), tree_.corner(triangle, 2)};
@@ -178,7 +177,7 @@ class SurfaceDistance::Walk {
     for (const Eigen::Vector3d& p : piece)
       if (std::abs(normal.dot(p - at[0])) > limit_) return false;
     double most = kReachesOver * limit_;
-    std::array<double, 3> over;  // of the corners, over the side where the piece reaches farthest
+    std::array<double, 3> over;  // of the corners, over the side where the piece extends farthest
     bool found = false;
     for (int side = 0; side < 3; ++side) {
       const Eigen::Vector3d outwards = (at[(side + 1) % 3] - at[side]).cross(normal).normalized();
@@ -191,7 +190,7 @@ class SurfaceDistance::Walk {
       found = true;
     }
     if (!found) return false;
-    // One corner is on one side of the plane, two are on the other.
+    // One corner is on one side of the plane, two on the other.
     int lone = 0;
     while ((over[lone] > 0) == (over[(lone + 1) % 3] > 0) || (over[lone] > 0) == (over[(lone + 2) % 3] > 0))
       ++lone;
@@ -206,7 +205,7 @@ class SurfaceDistance::Walk {
     return true;
   }
 
-  // Across its longest side, so that pieces do not become needles, whose radius would fall slowly.
+  // Across its longest side, so that pieces do not become slim, whose radius would decrease slowly.
   void halve(const Corners& piece, std::uint32_t nearest) {
     int i = 0;
     for (int side = 1; side < 3; ++side)
@@ -220,9 +219,9 @@ class SurfaceDistance::Walk {
 
   const RunContext& context_;
   const TriangleTree& tree_;
-  double limit_;            ///< less what rounding may add
-  double search_;           ///< square of how far the nearest triangle is looked for
-  Eigen::Vector3d offset_;  ///< of the frame in which pieces are asked for, from the soup's
+  double limit_;            ///< reduced by a bound on the rounding errors
+  double search_;           ///< square of the search radius for the nearest triangle
+  Eigen::Vector3d offset_;  ///< of the frame of the queried pieces, relative to the soup's
   const FreePieces& free_;
   Wanted wanted_;
   std::uint32_t last_ = TriangleTree::kNone;  ///< that some piece was near
@@ -231,7 +230,7 @@ class SurfaceDistance::Walk {
 
 SurfaceDistance::SurfaceDistance(std::span<const Eigen::Vector3f> points, std::span<const Triangle> triangles)
     : tree_(points, triangles, 1.0) {
-  // Only points that a triangle uses count: a scan may have stray ones far away.
+  // Only points that a triangle uses: a scan may have stray ones far away.
   Bounds box;
   for (const Triangle& t : triangles)
     for (const std::uint32_t p : t) box.add(points[p].cast<double>());
@@ -242,7 +241,7 @@ DistanceFromSurface SurfaceDistance::hold(std::span<const Eigen::Vector3f> point
                                           const Eigen::Vector3d& offset, std::span<const Triangle> triangles,
                                           double limit, const RunContext& context, const FreePieces& free,
                                           Wanted wanted) const {
-  // What each block of triangles came to has a place of its own, so that threads need no order.
+  // Results of each block of triangles have their own entry.
   constexpr std::size_t kBlock = 64;
   std::vector<std::vector<FarTriangle>> far((triangles.size() + kBlock - 1) / kBlock);
   std::vector<double> upper(far.size(), 0.0), free_area(far.size(), 0.0);
@@ -263,7 +262,7 @@ DistanceFromSurface SurfaceDistance::hold(std::span<const Eigen::Vector3f> point
     result.free_area += free_area[block];
     result.far.insert(result.far.end(), far[block].begin(), far[block].end());
   }
-  // The limit was lowered by as much, so that this is still at most the limit.
+  // The limit was lowered by as much, so this is at most the limit.
   result.upper += rounding_;
   return result;
 }

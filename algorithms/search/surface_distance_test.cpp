@@ -8,7 +8,7 @@
 #include <random>
 
 namespace hermesh {
-namespace {
+namespace surface_distance_test {
 
 using Eigen::Vector3d;
 using Eigen::Vector3f;
@@ -33,7 +33,7 @@ Soup square(float side, float height, std::uint32_t n = 1) {
   return soup;
 }
 
-/// What is found for a small bound. Whoever wants any bound is told of the same triangles that are far.
+/// Returns the result for a small bound. Expects the same far triangles if any bound is sufficient.
 DistanceFromSurface hold(const Soup& from, const Soup& to, double limit,
                          const Vector3d& offset = Vector3d::Zero(), const FreePieces& free = {}) {
   RunContext context;
@@ -92,7 +92,7 @@ TEST(SurfaceDistance, PlanePartsAreShownToBeNearHoweverSmallTheLimit) {
 }
 
 TEST(SurfaceDistance, WhatIsJustTooFarIsFarAtEverySizeAndTurn) {
-  // A triangle that is cut into few parts or many, at a slant to the square: one corner alone is too far,
+  // A triangle that is divided into few or many parts, oblique to the square: one corner only is too far,
   // then none.
   const Soup to = square(4, 0, 40);
   for (const float side : {0.1f, 0.3f, 0.5f, 1.0f, 2.5f})
@@ -130,11 +130,11 @@ TEST(SurfaceDistance, TheOffsetMovesWhatIsAskedAbout) {
   EXPECT_TRUE(hold(soup, soup, 0.3, Vector3d(0, 0, 0.29)).far.empty());
   const DistanceFromSurface found = hold(soup, soup, 0.3, Vector3d(0, 0, 0.31));
   ASSERT_EQ(found.far.size(), soup.triangles.size());
-  EXPECT_NEAR(found.far[0].place.z(), 0.0, 1e-6);  // in the frame of what was asked about
+  EXPECT_NEAR(found.far[0].place.z(), 0.0, 1e-6);  // in the frame of the queried triangles
 }
 
 TEST(SurfaceDistance, FreePiecesNeedNotBeNear) {
-  // What is above x = 0.5 is free; the other half is far.
+  // The part above x = 0.5 is free; the other half is far.
   const Soup from = square(1, 0),
              to{{{0, 0, 0}, {0.5f, 0, 0}, {0.5f, 1, 0}, {0, 1, 0}}, {{0, 1, 2}, {0, 2, 3}}};
   FreePieces free;
@@ -144,8 +144,9 @@ TEST(SurfaceDistance, FreePiecesNeedNotBeNear) {
   };
   const DistanceFromSurface found = hold(from, to, 0.1, Vector3d::Zero(), free);
   EXPECT_TRUE(found.far.empty());
-  EXPECT_NEAR(found.free_area, 0.4, 0.02);  // what is farther than a tenth from the half
-  // Where all may be far, nothing is: nor are pieces on the border of what is near, at whatever limit.
+  EXPECT_NEAR(found.free_area, 0.4, 0.02);  // the part farther than a tenth from the half
+  // If all pieces may be far, no triangle is reported; nor are pieces on the border of the near part, at any
+  // limit.
   const Soup slanted{{{0.03f, 0.02f, 0.01f}, {0.97f, 0.41f, 0.3f}, {0.33f, 0.99f, 0.5f}}, {{0, 1, 2}}},
       corner{{{0, 0, 0}, {0.4f, 0, 0}, {0.4f, 0.3f, 0}}, {{0, 1, 2}}};
   free.is_free = [](const std::array<Vector3d, 3>&) { return true; };
@@ -171,7 +172,7 @@ TEST(SurfaceDistance, RandomSoupsHoldExactlyWhereSamplesDo) {
         soup->triangles.push_back({3 * i, 3 * i + 1, 3 * i + 2});
       }
     const SurfaceDistance to(b.points, b.triangles);
-    double sampled = 0;  // the largest distance of a dense set of places
+    double sampled = 0;  // the largest distance of a dense set of samples
     for (const Triangle& t : a.triangles)
       for (int i = 0; i <= 20; ++i)
         for (int j = 0; i + j <= 20; ++j) {
@@ -212,5 +213,5 @@ TEST(SurfaceDistance, CanBeCancelled) {
                Cancelled);
 }
 
-}  // namespace
+}  // namespace surface_distance_test
 }  // namespace hermesh

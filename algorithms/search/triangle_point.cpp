@@ -7,7 +7,7 @@
 namespace hermesh {
 namespace {
 
-/// The point of side i–j that is nearest to p; its first end where the side has no length.
+/// Returns the point of side i–j that is nearest to p; its first end if the side has no length.
 TrianglePoint on_segment(const Eigen::Vector3d& p, const std::array<Eigen::Vector3d, 3>& corners, int i,
                          int j) {
   const Eigen::Vector3d along = corners[j] - corners[i];
@@ -24,8 +24,8 @@ TrianglePoint on_segment(const Eigen::Vector3d& p, const std::array<Eigen::Vecto
 TrianglePoint closest_point(const Eigen::Vector3d& p, const Eigen::Vector3d& a, const Eigen::Vector3d& b,
                             const Eigen::Vector3d& c) {
   const std::array<Eigen::Vector3d, 3> corners = {a, b, c};
-  // The best of the three sides, then the foot of the perpendicular, if it lies within: on a degenerate
-  // triangle the sides alone are right.
+  // The best of the three sides, then the foot of the perpendicular, if it lies within: for a degenerate
+  // triangle only the sides are correct.
   TrianglePoint best = on_segment(p, corners, 0, 1);
   const auto offer = [&](const TrianglePoint& other) {
     if ((other.position - p).squaredNorm() < (best.position - p).squaredNorm()) best = other;
@@ -36,11 +36,11 @@ TrianglePoint closest_point(const Eigen::Vector3d& p, const Eigen::Vector3d& a, 
   Eigen::Vector3d weights;
   for (int i = 0; i < 3; ++i) {
     const Eigen::Vector3d &u = corners[(i + 1) % 3], &v = corners[(i + 2) % 3];
-    // The part of the area opposite corner i, in proportion; projecting p first would change nothing.
+    // The fraction of the area opposite corner i; projecting p first would change nothing.
     weights[i] = (v - u).cross(p - u).dot(normal);
   }
-  // On a sliver the weights may be rounded; the point is one of the triangle all the same, and only as good
-  // as it is near.
+  // On a sliver the weights may be rounded; the point is still one of the triangle, and compared by its
+  // distance.
   if (const double sum = weights.sum(); weights.minCoeff() >= 0.0 && sum > 0.0) {
     weights /= sum;
     offer({weights[0] * a + weights[1] * b + weights[2] * c, weights});

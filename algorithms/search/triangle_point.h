@@ -1,4 +1,4 @@
-// The point of one triangle that is nearest to a place.
+// The point of a triangle that is nearest to another point.
 #pragma once
 
 #include <Eigen/Core>
@@ -11,8 +11,8 @@ struct TrianglePoint {
   Eigen::Vector3d weights;  ///< barycentric coordinates: at least 0, their sum is 1
 };
 
-/// The point of the triangle a b c that is nearest to p; of a degenerate triangle that of its segments, or
-/// the point that it is. Any unit, the same for all.
+/// Returns the point of the triangle a b c that is nearest to p; of a degenerate triangle that of its
+/// segments, or its only point. Any unit, the same for all.
 TrianglePoint closest_point(const Eigen::Vector3d& p, const Eigen::Vector3d& a, const Eigen::Vector3d& b,
                             const Eigen::Vector3d& c);
 

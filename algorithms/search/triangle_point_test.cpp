@@ -3,7 +3,7 @@
 #include <gtest/gtest.h>
 
 namespace hermesh {
-namespace {
+namespace triangle_point_test {
 
 using Eigen::Vector3d;
 
@@ -30,5 +30,5 @@ TEST(ClosestPoint, OfDegenerateTriangles) {
   EXPECT_EQ(closest_point({9, 5, 0}, a, b, b).position, b);
 }
 
-}  // namespace
+}  // namespace triangle_point_test
 }  // namespace hermesh

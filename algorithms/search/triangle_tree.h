@@ -15,25 +15,24 @@
 
 namespace hermesh {
 
-/// What a nearest-triangle query found.
+/// Result of a nearest-triangle query.
 struct NearestTriangle {
   double squared;          ///< squared distance in voxels², the given bound if nothing is within it
   std::uint32_t triangle;  ///< its number, TriangleTree::kNone if nothing is within the bound
 };
 
-/// Bounding volume hierarchy over triangles. They are sorted along the Hilbert curve through the centers of
-/// their boxes; every eight consecutive ones make a leaf, and every four consecutive boxes of a level make a
-/// box of the level above. So there are no links, and the tree is the same for every number of threads.
-/// Points, and with them boxes, are single precision in the caller's units; index space is point * scale,
-/// rounded once to double precision, so that a scaled box holds its scaled points without any slack. The tree
-/// refers to the caller's arrays, which have to outlive it. It takes about 8 bytes a triangle, and while it
-/// is built about 16 more.
+/// Bounding volume hierarchy over triangles, sorted along the Hilbert curve through the centers of their
+/// boxes; every eight consecutive ones are a leaf, and every four consecutive boxes of a level a box of the
+/// level above. So there are no links, and the tree is the same for every number of threads. Points and boxes
+/// are single precision in the caller's units; index space is point * scale, rounded once to double
+/// precision, so that a scaled box contains its scaled points exactly. The tree refers to the caller's
+/// arrays, which have to outlive it. It takes about 8 bytes a triangle, and 16 more during construction.
 class TriangleTree {
  public:
   static constexpr std::uint32_t kNone = std::numeric_limits<std::uint32_t>::max();
   static constexpr std::size_t kLeafSize = 8, kFan = 4;
 
-  /// Four sibling boxes in the caller's units. Those past the end of a level are empty: lower > upper.
+  /// Four sibling boxes in the caller's units. Those after the end of a level are empty: lower > upper.
   struct BoxPack {
     float lower[3][kFan], upper[3][kFan];
   };
@@ -42,15 +41,15 @@ class TriangleTree {
     std::uint32_t box, level;
   };
 
-  /// Builds the tree of `triangles`, of which there are fewer than 2^32 − 1, over finite `points`. `scale` is
-  /// the number of voxels per unit of the points, positive.
+  /// Builds the tree of `triangles`, fewer than 2^32 − 1, over finite `points`. `scale` is the number of
+  /// voxels per unit of the points, positive.
   TriangleTree(std::span<const Eigen::Vector3f> points, std::span<const Triangle> triangles, double scale);
 
-  /// The triangle nearest to p, in index space, that is no farther than the bound; of several that are
-  /// equally near the one of lowest number. The distance is that to the triangles with each corner moved by a
-  /// few units in the last place of the longest side, whatever their shape: slivers, segments and points are
-  /// triangles, too. Whoever is content with any triangle that is no farther than `enough_squared` gets the
-  /// first that is met, sooner.
+  /// Returns the triangle nearest to p, in index space, that is no farther than the bound; of several equally
+  /// near ones the one of lowest number. The distance is that to the triangles with each corner moved by a
+  /// few units in the last place of the longest side, for any shape: slivers, segments and points are
+  /// triangles, too. If any triangle no farther than `enough_squared` is sufficient, the first one found is
+  /// returned, sooner.
   NearestTriangle nearest(const Eigen::Vector3d& p,
                           double upper_bound_squared = std::numeric_limits<double>::infinity(),
                           double enough_squared = -1.0) const;
@@ -92,21 +91,22 @@ class TriangleTree {
   std::size_t byte_size() const {
     return packs_.size() * sizeof(BoxPack) + order_.size() * sizeof(std::uint32_t);
   }
-  /// Corner of a triangle in index space.
+  /// Returns a corner of a triangle in index space.
   Eigen::Vector3d corner(std::uint32_t triangle, int c) const {
     return points_[triangles_[triangle][c]].cast<double>() * scale_;
   }
 
-  // What other hierarchical methods walk over.
+  // For other hierarchical methods.
   std::span<const BoxPack> packs() const { return packs_; }
   std::size_t level_count() const { return first_.size(); }
-  /// First pack of a level; the packs of a level are consecutive, level 0 first, the root's pack last.
+  /// Returns the first pack of a level; the packs of a level are consecutive, level 0 first, the root's pack
+  /// last.
   std::size_t first_pack(std::size_t level) const { return first_[level]; }
-  /// The pack that holds the children of a box above level 0.
+  /// Returns the pack with the children of a box above level 0.
   std::size_t child_pack(Node ref) const {
     return first_[ref.level - 1] + (ref.box - first_[ref.level] * kFan);
   }
-  /// Numbers of the triangles in a leaf; none for a leaf past the end.
+  /// Returns the numbers of the triangles in a leaf; none after the last leaf.
   std::span<const std::uint32_t> leaf(std::size_t box) const {
     const std::size_t first = std::min(box * kLeafSize, order_.size());
     return {order_.data() + first, std::min(kLeafSize, order_.size() - first)};
@@ -115,8 +115,8 @@ class TriangleTree {
  private:
   void build_boxes();
 
-  /// Calls f(triangle) for the triangles for whose boxes, and the boxes above them, meets(lower, upper) is
-  /// true.
+  /// Calls f(triangle) for the triangles for which meets(lower, upper) is true of their boxes and of those
+  /// above.
   template <class Meets, class F>
   void visit(const Meets& meets, F&& f) const {
     if (packs_.empty()) return;
@@ -158,7 +158,8 @@ class TriangleTree {
   std::vector<std::size_t> first_;    ///< first pack of each level
 };
 
-/// Squared distance from p to the triangle abc, which may be degenerate, in the units of the points squared.
+/// Returns the squared distance from p to the triangle abc, which may be degenerate, in the units of the
+/// points squared.
 double squared_distance(const Eigen::Vector3d& p, const Eigen::Vector3d& a, const Eigen::Vector3d& b,
                         const Eigen::Vector3d& c);
 

@@ -8,15 +8,15 @@
 #include <random>
 
 namespace hermesh {
-namespace {
+namespace triangle_tree_test {
 
 struct Soup {
   std::vector<Eigen::Vector3f> points;
   std::vector<Triangle> triangles;
 };
 
-/// Triangles of some size around random places, of which every fifth each is a sliver, a segment, a point or
-/// a copy of the one before.
+/// Triangles of some size around random positions; every fifth is a sliver, a segment, a point or a copy of
+/// the one before.
 Soup random_soup(int count, double size, const Eigen::Vector3d& origin, unsigned seed) {
   std::mt19937 random(seed);
   std::uniform_real_distribution<double> unit(-1, 1);
@@ -174,5 +174,5 @@ TEST(TriangleTree, IsTheSameForEveryNumberOfThreads) {
   EXPECT_LT(static_cast<double>(trees[0].byte_size()) / 100000, 9);
 }
 
-}  // namespace
+}  // namespace triangle_tree_test
 }  // namespace hermesh

@@ -26,7 +26,7 @@ Vector3d closest_on_border(const GridTriangle& t, const Vector3d& p) {
   return best;
 }
 
-/// Merges a block of a later subset into that of an earlier one, which wins where distances are equal.
+/// Merges a block of a later subset into that of an earlier one, which takes precedence for equal distances.
 void merge_block(BandBlock& into, const BandBlock& from) {
   into.boundary = either(into.boundary, from.boundary);
   into.set = either(into.set, from.set);
@@ -39,8 +39,8 @@ void merge_block(BandBlock& into, const BandBlock& from) {
 
 }  // namespace
 
-/// Tells by the Voronoi regions of the corners, sides and inside where the nearest point is (Ericson,
-/// Real-Time Collision Detection, §5.1.5).
+/// Determines the nearest point by the Voronoi regions of the corners, sides and inside (Ericson, Real-Time
+/// Collision Detection, §5.1.5).
 Vector3d closest_point(const GridTriangle& triangle, const Vector3d& p) {
   const auto& [a, b, c] = triangle;
   const Vector3d ab = b - a, ac = c - a, ap = p - a, bp = p - b, cp = p - c;
@@ -49,7 +49,7 @@ Vector3d closest_point(const GridTriangle& triangle, const Vector3d& p) {
   if (d1 <= 0 && d2 <= 0) return a;
   if (d3 >= 0 && d4 <= d3) return b;
   if (d6 >= 0 && d5 <= d6) return c;
-  // What follows divides by the square of the area; on a sliver that is rounding alone.
+  // The rest divides by the square of the area, which on a sliver is only rounding.
   const double vc = d1 * d4 - d3 * d2, vb = d5 * d2 - d1 * d6, va = d3 * d6 - d5 * d4;
   if (!(ab.cross(ac).squaredNorm() > 1e-12 * ab.squaredNorm() * ac.squaredNorm()))
     return closest_on_border(triangle, p);
@@ -68,8 +68,8 @@ std::int32_t Band::find_or_add(const Voxel& lower) {
 void Band::merge(Band other, const RunContext& context) {
   for (std::unique_ptr<BandBlock>& theirs : other.blocks_) {
     context.check();
-    // Blocks that only the other grid has move over whole; each that was merged is freed at once, so that
-    // memory does not double.
+    // Blocks that only the other grid has are moved; each merged one is freed at once, so that memory does
+    // not double.
     const auto [entry, is_new] = numbers_.try_emplace(theirs->lower, size());
     if (is_new) {
       blocks_.push_back(std::move(theirs));
@@ -84,8 +84,8 @@ void Band::link(std::int32_t first, const RunContext& context) {
   parallel_blocks(std::size_t(size() - first), context, [&](std::size_t i) {
     BandBlock& own = *blocks_[first + std::int32_t(i)];
     for (int slot = 0; slot < 27; ++slot) {
-      // Lookups only read the map, and each thread writes to its own block. The other direction, below, is
-      // for one thread, for an old block may have several new neighbours.
+      // Each thread writes to its own block. The other direction, below, is sequential, for an old block may
+      // have several new neighbours.
       const auto there =
           numbers_.find({own.lower[0] + 8 * (slot / 9 - 1), own.lower[1] + 8 * (slot / 3 % 3 - 1),
                          own.lower[2] + 8 * (slot % 3 - 1)});
@@ -103,7 +103,7 @@ PaddedMask::PaddedMask(const Band& band, const BandBlock& block, BlockMask BandB
   const BlockMask* masks[27];
   static constexpr BlockMask kEmpty{};
   for (int slot = 0; slot < 27; ++slot) {
-    // Slot 13 is the block itself. A neighbour that is not there has no voxel set.
+    // Slot 13 is the block itself. A missing neighbour has no voxel set.
     const std::int32_t number = slot == 13 ? kNoBlock : block.neighbours[slot];
     masks[slot] = number == kNoBlock ? &kEmpty : &(band.block(number).*mask);
   }
@@ -114,8 +114,8 @@ PaddedMask::PaddedMask(const Band& band, const BandBlock& block, BlockMask BandB
         const BlockMask& m = *masks[neighbour_slot(x >> 3, y >> 3, dz)];
         return std::uint32_t(m[x & 7] >> (8 * (y & 7))) & 0xff;
       };
-      // Ten voxels along z in one word: the neighbour's last, this block's eight, the other neighbour's
-      // first.
+      // Ten voxels along z in one word: the previous neighbour's last, this block's eight, the next
+      // neighbour's first.
       rows_[x + 1][y + 1] = bits(-1) >> 7 | bits(0) << 1 | (bits(1) & 1) << 9;
     }
 }
@@ -134,7 +134,7 @@ BlockMask PaddedMask::face_neighbours() const {
   for (int x = 0; x < 8; ++x)
     for (int y = 0; y < 8; ++y) {
       const std::uint32_t straight = row(x - 1, y) | row(x + 1, y) | row(x, y - 1) | row(x, y + 1);
-      // A bit is set where one of its six neighbours has it; shifts are steps along z.
+      // Shifts are steps along z.
       const std::uint32_t bits = straight | row(x, y) >> 1 | row(x, y) << 1;
       result[x] |= std::uint64_t((bits >> 1) & 0xff) << (8 * y);
     }

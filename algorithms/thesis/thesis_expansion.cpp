@@ -1,17 +1,18 @@
 #include <algorithm>
 
 #include "algorithms/core/parallel.h"
-#include "algorithms/thesis/thesis_stages.h"
+#include "algorithms/thesis/thesis_band.h"
 
 namespace hermesh::thesis {
 namespace {
 
-/// Width of the band on either side, squared, in voxels².
+/// Squared width of the band on either side, in voxels².
 struct Limits {
   double exterior, interior;
 };
 
-/// Whether a voxel of the mask, on the block's side towards slot, has a neighbour in that slot's block.
+/// Returns true if a voxel of the mask, on the block's side towards slot, has a neighbour in that slot's
+/// block.
 bool reaches(const BlockMask& mask, int slot) {
   constexpr std::uint64_t kAll = ~std::uint64_t(0);
   // Rows are y, columns z, in a word of one x: first, all, or last.
@@ -24,8 +25,8 @@ bool reaches(const BlockMask& mask, int slot) {
   return found != 0;
 }
 
-/// Makes the blocks that the neighbours of the last layer lie in. One thread does, in the order of the
-/// blocks, so that numbers are the same on every run.
+/// Makes the blocks that the neighbours of the last layer lie in. Sequential, so that numbers are the same on
+/// every run.
 void add_blocks(Band& band, const RunContext& context) {
   const std::int32_t before = band.size();
   for (std::int32_t number = 0; number < before; ++number) {
@@ -33,7 +34,7 @@ void add_blocks(Band& band, const RunContext& context) {
     const BandBlock& block = band.block(number);
     if (!any(block.layer)) continue;
     for (int slot = 0; slot < 27; ++slot) {
-      // Neighbours share a face or an edge; across a corner none is reached.
+      // Neighbours share a face or an edge, not a corner.
       const bool corner = slot / 9 != 1 && slot / 3 % 3 != 1 && slot % 3 != 1;
       if (slot == 13 || corner || block.neighbours[slot] != kNoBlock || !reaches(block.layer, slot)) continue;
       const Voxel& lower = block.lower;
@@ -44,15 +45,15 @@ void add_blocks(Band& band, const RunContext& context) {
   band.link(before, context);
 }
 
-/// One layer of §5.5. Limits are squares of the widths.
+/// One layer of §5.5.
 struct Expansion {
   Band& band;
   const Triangles& triangles;
   Limits limits;
 
-  /// Adds a voxel as algorithm 5 does: by the triangle of the neighbour that is nearest to the surface,
-  /// whether or not that triangle is the nearest to the voxel. Threads write distances only where none is
-  /// set, which nobody reads.
+  /// Adds a voxel as algorithm 5 does: by the triangle of the neighbour that is nearest to the surface, even
+  /// if that triangle is not the nearest to the voxel. Threads write distances only where none is set, which
+  /// are not read.
   void add_voxel(BandBlock& block, int sample) const {
     Place closest{nullptr, 0};
     for (const std::array<int, 3>& step : kNeighbours) {
@@ -72,8 +73,8 @@ struct Expansion {
     if (outside) add(block.found_outside, sample);
   }
 
-  /// Tries the voxels around the last layer. What is found waits until all blocks are done, so that a layer
-  /// sees only the layers before it.
+  /// Tests the voxels around the last layer. The results are stored until all blocks are done, so that a
+  /// layer depends only on the layers before it.
   void find_voxels(BandBlock& block) const {
     block.found = block.found_outside = {};
     const BlockMask near = PaddedMask(band, block, &BandBlock::layer).face_and_edge_neighbours();
@@ -81,7 +82,7 @@ struct Expansion {
   }
 };
 
-/// Makes what was found the last layer.
+/// Makes the results the last layer.
 void take_layer(BandBlock& block) {
   block.layer = block.found;
   block.set = either(block.set, block.found);

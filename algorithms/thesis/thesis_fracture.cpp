@@ -5,11 +5,11 @@
 #include <limits>
 
 #include "algorithms/core/parallel.h"
-#include "algorithms/core/stopwatch.h"
+#include "algorithms/core/run_context.h"
 #include "algorithms/fracture/labelled_solid.h"
 #include "algorithms/hermite/combine.h"
-#include "algorithms/hermite/dense/dense_combine.h"
 #include "algorithms/thesis/adaptive_dual_contouring/adaptive_dual_contouring.h"
+#include "algorithms/thesis/voxels/dense_hermite.h"
 
 namespace hermesh {
 namespace {
@@ -32,19 +32,19 @@ class CodeSolid {
         upper[a] = std::max(upper[a], leaf.lower[a]);
       }
     for (int a = 0; a < 3; ++a) {
-      // Two blocks beyond the object's on every side: an empty layer, which closes the solid, and one between
-      // it and the object, so that the closing faces cut nothing of the object.
+      // Two blocks more on every side: an empty layer, which closes the solid, and one between it and the
+      // object, so that the closing faces do not intersect the object.
       first_[a] = lower[a] - 16;
       size_[a] = (upper[a] - lower[a]) / 8 + 5;
     }
     masks_.resize(std::size_t(size_[0]) * std::size_t(size_[1]) * std::size_t(size_[2]));
   }
 
-  /// Signs of all blocks first, since an edge at a block's upper side needs those of the next block; then
-  /// crossings.
+  /// Computes signs of all blocks first, since an edge at a block's upper side needs those of the next block;
+  /// then crossings.
   FloatHermite run(RunContext& context) {
     parallel_blocks(masks_.size(), context, [&](std::size_t b) {
-      // Most blocks hold nothing of one cell among hundreds, and to say so is far cheaper than all their
+      // Most blocks contain nothing of one cell among hundreds, and this test is far cheaper than all their
       // codes.
       if (is_border(b) || !cutters_.may_hold(lower_of(b), code_)) return;
       Codes codes;
@@ -61,7 +61,7 @@ class CodeSolid {
     });
     FloatHermite result;
     result.placement = placement_;
-    // Blocks in lexicographic order, as SparseHermite has them; each was one thread's.
+    // Blocks in lexicographic order, as in SparseHermite.
     for (std::size_t b = 0; b < masks_.size(); ++b) {
       if (crossings[b].empty()) continue;
       leaves[b].first = static_cast<std::uint32_t>(result.crossings.size());
@@ -72,18 +72,18 @@ class CodeSolid {
   }
 
  private:
-  /// Place of a block in the box, in blocks.
+  /// Returns the position of a block in the box, in blocks.
   std::array<std::int32_t, 3> place(std::size_t b) const {
     const auto y = static_cast<std::size_t>(size_[1]), z = static_cast<std::size_t>(size_[2]);
     return {static_cast<std::int32_t>(b / (y * z)), static_cast<std::int32_t>(b / z % y),
             static_cast<std::int32_t>(b % z)};
   }
-  /// Index coordinates of a block's first sample.
+  /// Returns the index coordinates of a block's first sample.
   At lower_of(std::size_t b) const {
     const auto p = place(b);
     return {first_[0] + 8 * p[0], first_[1] + 8 * p[1], first_[2] + 8 * p[2]};
   }
-  /// Whether a block is of the outermost layer.
+  /// Returns true if a block is in the outermost layer.
   bool is_border(std::size_t b) const {
     const auto p = place(b);
     for (int a = 0; a < 3; ++a)
@@ -91,7 +91,7 @@ class CodeSolid {
     return false;
   }
 
-  /// A block's signs, with those of the first samples beyond its upper sides.
+  /// Returns a block's signs, with those of the first samples beyond its upper sides.
   SignLeaf leaf_at(std::size_t b) const {
     SignLeaf leaf{lower_of(b), 0, masks_[b], {}};
     const std::size_t steps[3] = {std::size_t(size_[1]) * std::size_t(size_[2]), std::size_t(size_[2]), 1};
@@ -101,7 +101,7 @@ class CodeSolid {
     return leaf;
   }
 
-  /// The crossings of a block's edges by axis and sample, as Hermite data is ordered.
+  /// Returns the crossings of a block's edges by axis and sample, the order of Hermite data.
   std::vector<EdgeCrossing> crossings_of(const SignLeaf& leaf, const std::array<BlockMask, 3>& edges) const {
     // Codes of the block itself, last, and of its upper neighbour along each axis.
     std::array<Codes, 4> codes;
@@ -123,8 +123,8 @@ class CodeSolid {
     return result;
   }
 
-  /// A crossing, whose normal looks out of the solid. Where the box cuts the solid off there is no crossing
-  /// to ask for; the middle of the edge will do.
+  /// Returns a crossing, whose normal points out of the solid. Where the box closes the solid there is no
+  /// cutter, and the middle of the edge is used.
   EdgeCrossing crossing(const SignLeaf& leaf, int sample, int axis, CutCode first, CutCode second) const {
     const At at{leaf.lower[0] + (sample >> 6), leaf.lower[1] + ((sample >> 3) & 7),
                 leaf.lower[2] + (sample & 7)};
@@ -133,8 +133,8 @@ class CodeSolid {
     if (first != second)
       if (const auto found = cutters_.crossing(at, axis, first, second)) result = found->crossing;
     const bool inside_first = test(leaf.inside, sample);
-    // From inside to outside the normal points along the edge, from outside to inside against it. A cutter
-    // does not know which of its sides the solid is on.
+    // The normal points along the edge from inside to outside. A cutter does not know which of its sides the
+    // solid is on.
     if ((result.normal[axis] >= 0) != inside_first)
       for (float& n : result.normal) n = -n;
     return result;
@@ -148,7 +148,7 @@ class CodeSolid {
   std::vector<BlockMask> masks_;
 };
 
-/// The data in the form that a rule combines.
+/// Converts the data to the form that a rule combines.
 template <class Data>
 Data converted(const FloatHermite& hermite, RunContext& context) {
   if constexpr (std::is_same_v<Data, ThesisDense>)
@@ -160,7 +160,7 @@ Data converted(const FloatHermite& hermite, RunContext& context) {
 bool is_empty(const FloatHermite& hermite) { return hermite.leaves.empty(); }
 bool is_empty(const ThesisDense& hermite) { return hermite.leaves() == 0; }
 
-/// The steps of §7.1, one after the other, on grids of one form.
+/// The sequential steps of §7.1, on grids of one form.
 template <class Data>
 class InTurn {
  public:
@@ -172,16 +172,15 @@ class InTurn {
         hand_over_(hand_over),
         context_(context),
         rest_(converted<Data>(object, context)) {
-    // The meshes report by themselves; here their figures are summed, so that there is one sentence for all
-    // pieces.
+    // The statistics of the meshes are summed here, so that there is one note for all pieces.
     meshing_.cancel = context.cancel;
   }
 
   void run() {
-    // Solids have Hermite data of their own; planes and cells of seeds are made into solids code by code.
+    // Solids have Hermite data of their own; planes and Voronoi cells are made into solids code by code.
     const bool solids = cutters_.count() > 0 && !cutters_.plane_sides() && cutters_.signs(0, {}).has_value();
     std::vector<CutCode> codes = codes_within(object_, cutters_, context_);
-    if (solids) {  // each is a solid of its own, and what is left is no cutter's
+    if (solids) {  // each is a solid of its own, and the rest belongs to no cutter
       codes.resize(cutters_.count());
       for (std::size_t k = 0; k < codes.size(); ++k) codes[k] = k;
     }
@@ -211,11 +210,10 @@ class InTurn {
     const FloatHermite* const solid = solids ? cutters_.solid(code) : &made;
     Data cutter;
     if (solid) cutter = converted<Data>(*solid, context_);
-    // The watch gives lap times, so that each step has its own.
     piece.conversion_seconds = watch.seconds();
     Data taken;
     if (solid) {
-      // The second and the third: what is left is the object from now on.
+      // The second and the third: the rest is the object from now on.
       taken = combine(Boolean::intersect, rest_, cutter, context_);
       rest_ = combine(Boolean::subtract, std::move(rest_), std::move(cutter), context_);
     }
@@ -225,7 +223,8 @@ class InTurn {
     hand_over_(std::move(piece));
   }
 
-  /// Meshes a piece by itself, by chapter 6: along a rim its points need not be those of the next piece.
+  /// Meshes a piece by itself, by chapter 6: along a boundary its points may differ from those of the next
+  /// piece.
   PolygonMesh meshed(const Data& piece) {
     return adaptive_dual_contouring(piece, {.threshold = threshold_}, nullptr, meshing_);
   }
@@ -252,7 +251,7 @@ class InTurn {
   const std::function<void(ThesisPiece&&)>& hand_over_;
   RunContext& context_;
   RunContext meshing_;
-  Data rest_;  ///< what no cutter has taken yet
+  Data rest_;  ///< the part that no cutter has taken yet
 };
 
 }  // namespace

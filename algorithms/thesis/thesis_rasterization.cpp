@@ -5,22 +5,21 @@
 #include <cmath>
 #include <thread>
 
-#include "algorithms/thesis/thesis_stages.h"
+#include "algorithms/thesis/thesis_band.h"
 
 namespace hermesh {
 namespace {
 
-/// Largest number of samples that are rasterised between two looks for cancellation, a line segment's more or
-/// less.
+/// Approximate number of samples that are rasterised between two checks for cancellation.
 constexpr std::size_t kVoxelsAtOnce = 4096;
 
-/// The voxel that a point is rounded to, halves upwards (std::round would round them away from 0).
+/// Returns the voxel that a point is rounded to, halves upwards (std::round would round them away from 0).
 Voxel nearest_voxel(const Eigen::Vector3d& p) {
   const auto round = [](double x) { return std::int32_t(std::floor(x + 0.5)); };
   return {round(p.x()), round(p.y()), round(p.z())};
 }
 
-/// The metric d_T of eq. 5.1: the number of parts that every edge is divided into.
+/// Returns the metric d_T of eq. 5.1: the number of parts that every edge is divided into.
 std::int64_t edge_parts(const GridTriangle& t) {
   const auto largest = [](const Eigen::Vector3d& v) { return v.cwiseAbs().maxCoeff(); };
   return std::int64_t(
@@ -44,12 +43,12 @@ void for_each_batch(const GridTriangle& t, std::vector<Voxel>& voxels, F&& visit
     for (const Eigen::Vector3d& corner : t) put(nearest_voxel(corner));
   else
     // Segment i runs at barycentric weight i/n off the first corner. In double precision a sum of three
-    // products, so that halves may round either way (rasterize_by_samples() says what follows).
+    // products, so that halves may round either way (see rasterize_by_samples()).
     for (std::int64_t i = 0; i <= n; ++i) {
       for (std::int64_t j = 0; j <= i; ++j)
         put(nearest_voxel((double(n - i) * t[0] + double(i - j) * t[1] + double(j) * t[2]) / double(n)));
-      // A large triangle is handed over in parts, so that its voxels are never all in memory; a voxel in two
-      // parts is added twice, to no effect.
+      // A large triangle is passed on in parts, so that its voxels are never all in memory; a voxel in two
+      // parts is added twice, without effect.
       if (voxels.size() < kVoxelsAtOnce) continue;
       make_unique(voxels);
       visit(voxels);
@@ -76,7 +75,7 @@ namespace hermesh::thesis {
 namespace {
 
 // The m subsets of §5.2. More than most machines have threads, and a constant, for the order in which voxels
-// are updated has an effect on distances (algorithm 2).
+// are updated affects distances (algorithm 2).
 constexpr std::size_t kSubsets = 32;
 
 /// A subset's grid while it is written. A voxel and its neighbours lie in up to eight blocks, which differ in
@@ -102,7 +101,7 @@ class SubsetGrid {
   Band take() { return std::move(band_); }
 
  private:
-  /// Where a voxel is kept.
+  /// A voxel's block and sample.
   struct At {
     BandBlock& block;
     int sample;
@@ -116,7 +115,7 @@ class SubsetGrid {
   }
 
   /// Updates a voxel next to a boundary voxel as algorithm 2 does. One that is nearer than ½ to an earlier
-  /// triangle is left alone, even if the new triangle is nearer: the print's trap. (0.25 is ½ squared.)
+  /// triangle is unchanged, even if the new triangle is nearer: the print's trap. (0.25 is ½ squared.)
   void add_neighbour(const Voxel& voxel) {
     const auto [block, sample] = at(voxel);
     if (test(block.set, sample) && (block.squared_distance[sample] < 0.25f || block.triangle[sample] == id_))
@@ -124,8 +123,7 @@ class SubsetGrid {
     update(block, sample, voxel);
   }
 
-  /// Takes the triangle's distance if it is the smaller one. The first one always is: unset distances are
-  /// infinite.
+  /// Takes the triangle's distance if it is the smaller one. Unset distances are infinite.
   void update(BandBlock& block, int sample, const Voxel& voxel) {
     const Eigen::Vector3d p = centre(voxel);
     const auto squared = float((closest_point(triangle_, p) - p).squaredNorm());
@@ -142,7 +140,7 @@ class SubsetGrid {
   std::array<BandBlock*, 8> cache_{};
 };
 
-/// The progress of all threads: counts from any, reports from the thread that made it.
+/// The progress of all threads, counted by any, reported by the thread that made it.
 class Progress {
  public:
   Progress(const RunContext& context, std::size_t total) : context_(context), total_(total) {}
@@ -186,7 +184,8 @@ struct Rasterizer {
   }
 
   /// Rasterises the subsets from `first` to before `end` into one grid: the parallel reduction of §3.4. The
-  /// tree of merges is fixed, and a branch is merged as soon as it is done, so few grids are alive at a time.
+  /// tree of merges is fixed, and a branch is merged as soon as it is done, so that few grids exist at a
+  /// time.
   Band rasterize_subsets(std::size_t first, std::size_t end) {
     if (end - first == 1) return rasterize_subset(first);
     const std::size_t middle = first + (end - first) / 2;

@@ -9,7 +9,7 @@
 #include "algorithms/thesis/thesis_voxelizer.h"
 
 namespace hermesh {
-namespace {
+namespace thesis_rasterization_test {
 
 using Eigen::Vector3d;
 
@@ -87,5 +87,5 @@ TEST(ThesisRasterization, SamplesMissSomeVoxelsAndInventNone) {
   }
 }
 
-}  // namespace
+}  // namespace thesis_rasterization_test
 }  // namespace hermesh

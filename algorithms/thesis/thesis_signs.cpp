@@ -8,7 +8,7 @@
 #include <utility>
 
 #include "algorithms/core/parallel.h"
-#include "algorithms/thesis/thesis_stages.h"
+#include "algorithms/thesis/thesis_band.h"
 
 namespace hermesh::thesis {
 namespace {
@@ -17,7 +17,7 @@ using Eigen::Vector3d;
 
 // ---- §5.3, the outer shell.
 
-/// The sample at step k along an axis, on line (u, v) of a block.
+/// Returns the sample at step k along an axis, on line (u, v) of a block.
 int sample_on_line(int axis, int u, int v, int k) {
   std::array<int, 3> local;
   local[axis] = k, local[(axis + 1) % 3] = u, local[(axis + 2) % 3] = v;
@@ -25,7 +25,7 @@ int sample_on_line(int axis, int u, int v, int k) {
 }
 
 /// Marks the first voxel with a distance of every line along a column of blocks, unless it is a boundary
-/// voxel. Each of the 64 lines has a bit in `pending` until its first voxel is met.
+/// voxel. Each of the 64 lines has a bit in `pending` until its first voxel is found.
 template <class Iterator>
 void mark_first_voxels(Band& band, int axis, bool backwards, Iterator begin, Iterator end) {
   std::uint64_t pending = ~std::uint64_t(0);
@@ -44,15 +44,15 @@ void mark_first_voxels(Band& band, int axis, bool backwards, Iterator begin, Ite
   }
 }
 
-/// Marks where the flood begins, from both ends of every grid line along an axis.
+/// Marks the seeds of the flood fill, from both ends of every grid line along an axis.
 void mark_seeds(Band& band, int axis, const RunContext& context) {
   std::vector<std::pair<Voxel, std::int32_t>> order(band.size());
   parallel_blocks(order.size(), context, [&](std::size_t i) {
     const Voxel& lower = band.block(std::int32_t(i)).lower;
     order[i] = {{lower[(axis + 1) % 3], lower[(axis + 2) % 3], lower[axis]}, std::int32_t(i)};
   });
-  // Sorted by line and then along it, the blocks of a column are consecutive, and columns share no block:
-  // each is one thread's.
+  // By line and then along it: the blocks of a column are consecutive, and columns share no block, so each is
+  // one thread's.
   tbb::parallel_sort(order.begin(), order.end());
   std::vector<std::size_t> columns;  // where each begins
   for (std::size_t i = 0; i < order.size(); ++i)
@@ -67,9 +67,9 @@ void mark_seeds(Band& band, int axis, const RunContext& context) {
   });
 }
 
-/// Lets the outside grow within a block, and from its neighbours into it. True if it grew.
+/// Extends the outside within a block, and from its neighbours into it. Returns true if it grew.
 bool flood_block(const Band& band, BandBlock& block) {
-  // The boundary voxels are the wall that restricts the flood.
+  // The boundary voxels are the wall that restricts the flood fill.
   const BlockMask open = without(block.set, block.boundary), before = block.outside;
   PaddedMask outside(band, block, &BandBlock::outside);
   while (true) {
@@ -80,8 +80,8 @@ bool flood_block(const Band& band, BandBlock& block) {
   }
 }
 
-/// Floods block by block, and looks again at the blocks next to one that changed, until none changes. The
-/// outside only grows, so that the end is the same in any order.
+/// Floods block by block, and again the blocks next to one that changed, until none changes. The outside only
+/// grows, so that the result does not depend on the order.
 void flood(Band& band, const RunContext& context) {
   std::deque<std::int32_t> queue;
   std::vector<bool> queued(band.size(), true);
@@ -108,14 +108,14 @@ struct BoundarySigns {
   const Triangles& triangles;
   double cosine;  ///< of the sign angle
 
-  /// The vector from a voxel's centre to its closest point, made again from its triangle.
+  /// Returns the vector from a voxel's centre to its closest point, from its triangle.
   Vector3d to_surface(const BandBlock& block, int sample) const {
     const Vector3d p = centre(block.voxel(sample));
     return closest_point(triangles[block.triangle[sample]], p) - p;
   }
 
-  /// Whether the vector of a neighbour that the flood marked makes an angle below the sign angle with the
-  /// voxel's own: both then look at the surface from one side.
+  /// Returns true if the vector of a neighbour that the flood fill marked makes an angle below the sign angle
+  /// with the voxel's own: both are then on the same side of the surface.
   bool is_outside(const BandBlock& block, int sample) const {
     Vector3d own = Vector3d::Zero();
     for (const std::array<int, 3>& step : kNeighbours) {
@@ -129,8 +129,8 @@ struct BoundarySigns {
     return false;
   }
 
-  /// Judges the boundary voxels of a block by the flood's marks alone. Results wait in `found_outside`, so
-  /// that no voxel sees what was found for another.
+  /// Evaluates the boundary voxels of a block by the marks of the flood fill. The results are stored in
+  /// `found_outside`, so that no voxel depends on another's.
   void evaluate(BandBlock& block) const {
     block.found_outside = {};
     for_each_bit(block.boundary, [&](int sample) {

@@ -14,7 +14,7 @@
 #include "algorithms/core/parallel.h"
 #include "algorithms/lattice/grid_placement.h"
 #include "algorithms/lattice/memory_estimate.h"
-#include "algorithms/thesis/thesis_stages.h"
+#include "algorithms/thesis/thesis_band.h"
 #include "algorithms/thesis/thesis_volumes.h"
 
 namespace hermesh {
@@ -23,16 +23,16 @@ namespace {
 using Leaf = openvdb::FloatTree::LeafNodeType;
 using IdLeaf = openvdb::Int32Tree::LeafNodeType;
 
-/// The numbers of triangles in the mesh, by those in the local copy.
+/// Maps the numbers of triangles in the local copy to those in the mesh.
 struct Numbers {
-  std::vector<std::uint32_t> shuffled;  ///< none where both are the same
+  std::vector<std::uint32_t> shuffled;  ///< empty if both are the same
   std::int32_t operator()(std::uint32_t id) const {
     return std::int32_t(shuffled.empty() ? id : shuffled[id]);
   }
 };
 
-/// Numbers from 0 on, shuffled by Fisher & Yates, spelled out because std::shuffle gives another order on
-/// another standard library.
+/// Returns numbers from 0 on, shuffled by Fisher & Yates; std::shuffle gives another order on another
+/// standard library.
 std::vector<std::uint32_t> shuffled(std::size_t count, std::uint64_t seed, const RunContext& context) {
   std::vector<std::uint32_t> numbers(count);
   std::iota(numbers.begin(), numbers.end(), 0u);
@@ -45,7 +45,7 @@ std::vector<std::uint32_t> shuffled(std::size_t count, std::uint64_t seed, const
 }
 
 /// Stage 1 of §5.1: triangles in the grid's local space, whose unit is a voxel and whose origin the mesh's.
-/// `numbers` are those of the mesh in the order of the triangles, or none where the order is the mesh's.
+/// `numbers` are those of the mesh in the order of the triangles, empty for the mesh's own order.
 thesis::Triangles local_copy(const VoxelizationInput& input, std::uint64_t shuffle_seed,
                              std::vector<std::uint32_t>& numbers) {
   const Stage stage(input.context, "local copy");
@@ -68,14 +68,14 @@ struct ThesisWidths {
   double exterior, interior;
 };
 
-/// The leaves of one block, both null when no voxel is within its side's band.
+/// The leaves of one block, both null if no voxel is within its side's band.
 struct Leaves {
   std::unique_ptr<Leaf> distance;
   std::unique_ptr<IdLeaf> nearest;
 };
 
-/// Makes leaves of the band's distances with their signs and, where `numbers` says so, of their triangles.
-/// Inactive values are for signedFloodFill to set.
+/// Makes leaves of the band's distances with their signs and, with `numbers`, of their triangles. Inactive
+/// values are left to signedFloodFill.
 Leaves make_leaves(const thesis::BandBlock& block, const ThesisWidths& widths, double voxel_size,
                    const Numbers* numbers) {
   const openvdb::Coord lower(block.lower[0], block.lower[1], block.lower[2]);
@@ -83,7 +83,7 @@ Leaves make_leaves(const thesis::BandBlock& block, const ThesisWidths& widths, d
                 numbers ? std::make_unique<IdLeaf>(lower, -1) : nullptr};
   for_each_bit(block.set, [&](int sample) {
     const bool outside = test(block.outside, sample);
-    // Until here distances are squared, in voxels, and have no sign; the thesis stores negative ones.
+    // Until here distances are squared, in voxels, and unsigned.
     const double distance = std::sqrt(double(block.squared_distance[sample]));
     if (!(distance < (outside ? widths.exterior : widths.interior))) return;
     leaves.distance->setValueOn(openvdb::Index(sample), float((outside ? distance : -distance) * voxel_size));
@@ -93,13 +93,15 @@ Leaves make_leaves(const thesis::BandBlock& block, const ThesisWidths& widths, d
   return leaves;
 }
 
-/// Names the grid and puts voxel (0, 0, 0) at the mesh's origin, as in the local copy of the points.
+/// Sets the grid's name and its transform, which maps voxel (0, 0, 0) to the mesh's origin, as in the local
+/// copy of the points.
 void place(openvdb::GridBase& grid, const char* name, const VoxelizationInput& input) {
   grid.setTransform(transform_at(input.mesh.origin, input.voxel_size));
   grid.setName(name);
 }
 
-/// The grids in world units. It frees the band block by block, so that it and they are never whole at a time.
+/// Makes the grids in world units. Frees the band block by block, so that both never exist completely at the
+/// same time.
 Voxelization make_grids(thesis::Band& band, const ThesisWidths& widths, const VoxelizationInput& input,
                         bool is_signed, const Numbers* numbers) {
   const Stage stage(input.context, "level set");
@@ -110,7 +112,6 @@ Voxelization make_grids(thesis::Band& band, const ThesisWidths& widths, const Vo
   std::vector<Leaves> leaves(band.size());
   parallel_blocks(leaves.size(), input.context, [&](std::size_t i) {
     leaves[i] = make_leaves(band.block(std::int32_t(i)), widths, input.voxel_size, numbers);
-    // Each block is one thread's; leaves are handed to the tree by one thread, in the order of the blocks.
     band.release(std::int32_t(i));
   });
   for (Leaves& leaf : leaves) {
@@ -118,22 +119,22 @@ Voxelization make_grids(thesis::Band& band, const ThesisWidths& widths, const Vo
     if (leaf.nearest) result.nearest->tree().addLeaf(leaf.nearest.release());
   }
   input.context.check();
-  // Without signs what is beyond the band is the background, on either side.
+  // Without signs the background lies beyond the band on either side.
   if (is_signed) openvdb::tools::signedFloodFillWithValues(result.distance->tree(), outside, inside);
   place(*result.distance, is_signed ? "sdf" : "udf", input);
-  // Programs take a level set to have signs.
+  // Programs expect a level set to have signs.
   result.distance->setGridClass(is_signed ? openvdb::GRID_LEVEL_SET : openvdb::GRID_UNKNOWN);
   if (result.nearest) place(*result.nearest, "triangle-id", input);
   return result;
 }
 
-/// Takes all distances for those of the outside, as they are before there are signs.
+/// Makes all distances those of the outside, as before there are signs.
 void forget_signs(thesis::Band& band) {
   for (std::int32_t i = 0; i < band.size(); ++i) band.block(i).outside = band.block(i).set;
 }
 
-/// Whether more than a hundredth of the voxels is inside. A closed mesh has about as many inside as outside;
-/// of an open mesh a few remain.
+/// Returns true if more than a hundredth of the voxels is inside. A closed mesh has about as many inside as
+/// outside; an open mesh a few.
 bool has_inside(const thesis::Band& band) {
   std::size_t set = 0, outside = 0;
   for (std::int32_t i = 0; i < band.size(); ++i) {
@@ -143,7 +144,6 @@ bool has_inside(const thesis::Band& band) {
   return 100 * (set - outside) > set;
 }
 
-/// The options that set ThesisVoxelizerOptions.
 const OptionTable<ThesisVoxelizerOptions>& option_table() {
   using Options = ThesisVoxelizerOptions;
   static const auto table =
@@ -153,7 +153,7 @@ const OptionTable<ThesisVoxelizerOptions>& option_table() {
                   "larger makes "
                   "more outside",
                   {"signs=flood-fill"})
-          // A seed is a whole number of up to 1e15, which a double holds exactly.
+          // A seed is an integer of up to 1e15, which a double represents exactly.
           .number("shuffle_seed", &Options::shuffle_seed, {.maximum = 1e15},
                   "takes the triangles in a random order with this seed; 0 in that of the mesh")
           .choice("signs", &Options::signs, {{"flood-fill", true}, {"unsigned", false}},
@@ -179,14 +179,14 @@ ThesisVoxelizerOptions thesis_voxelizer_options(const Options& options) {
 Voxelization thesis_voxelization(const VoxelizationInput& input, const ThesisVoxelizerOptions& options,
                                  bool nearest) {
   check_voxelization_fits(input.mesh, input.voxel_size, input.exterior_band, input.interior_band);
-  // A negation, so that an angle that is no number is refused, too.
+  // A negation, so that NaN is refused, too.
   if (!(options.sign_angle > 0.0 && options.sign_angle <= 180.0))
     throw Error("The sign angle must be above 0 and at most 180 degrees, not " +
                 std::to_string(options.sign_angle) + ".");
   initialize_openvdb();
   Numbers numbers;
   const thesis::Triangles triangles = local_copy(input, options.shuffle_seed, numbers.shuffled);
-  // The stages 2 to 5 of §5.1 in their order; stage 6, fog, is for whoever has the level set.
+  // Stages 2 to 5 of §5.1; stage 6, fog, is made from the level set.
   thesis::Band band = thesis::rasterize(triangles, input.context);
   ThesisWidths widths{input.exterior_band, input.interior_band};
   if (options.signs) {

@@ -19,7 +19,7 @@
 #include "algorithms/thesis/thesis_volumes.h"
 
 namespace hermesh {
-namespace {
+namespace thesis_voxelizer_test {
 
 using Eigen::Vector3d;
 using openvdb::Coord;
@@ -88,7 +88,7 @@ void for_each_voxel(int half, F&& f) {
       for (int z = -half; z <= half; ++z) f(Coord(x, y, z));
 }
 
-/// Whether two grids have the same value and the same state in every voxel and tile.
+/// Returns true if two grids have the same value and the same state in every voxel and tile.
 bool same(const openvdb::FloatGrid& a, const openvdb::FloatGrid& b) {
   if (a.tree().leafCount() != b.tree().leafCount() || !a.tree().hasSameTopology(b.tree())) return false;
   auto other = b.cbeginValueAll();
@@ -318,7 +318,7 @@ TEST(ThesisVoxelizer, SignAngleIsCheckedAndMatters) {
   EXPECT_FALSE(same(*voxelize(mesh, 1.0, {.sign_angle = 20}), *voxelize(mesh, 1.0, {.sign_angle = 150})));
 }
 
-// Stage 4 (fig. 5.5): without it the band keeps what self-intersections left inside.
+// Stage 4 (fig. 5.5): without it the band includes the voxels that self-intersections left inside.
 TEST(ThesisVoxelizer, WithoutCleanUpVoxelsOfSelfIntersectionsStay) {
   const Vector3d left(-14, 0, 0), right(14, 0, 0);
   const PolygonMesh mesh = joined(sphere(30.0, 5, left), sphere(30.0, 5, right));
@@ -412,5 +412,5 @@ TEST(ThesisVoxelizer, StopsSoonWhenAskedTo) {
   EXPECT_LT(std::chrono::duration<double>(end - asked).count(), 1.0);
 }
 
-}  // namespace
+}  // namespace thesis_voxelizer_test
 }  // namespace hermesh

@@ -15,14 +15,13 @@
 namespace hermesh {
 namespace {
 
-/// Where a band is wider than `kWideBand` voxels, the triangles look for the voxels within `kNearBand` alone,
-/// which is as far as they get by looking at the blocks next to theirs, and each voxel beyond looks for its
-/// triangle (wide_band.h).
+/// In a band wider than `kWideBand` voxels, triangles search only the voxels within `kNearBand`, which the
+/// blocks next to theirs contain, and each voxel beyond searches its triangle (wide_band.h).
 constexpr double kWideBand = 16.0, kNearBand = 6.0;
 
-/// Where the surface runs through samples, the other end of a crossed edge is a whole voxel away from it: not
-/// below the width of a band of one voxel, yet with a sign that only a leaf can hold. In voxels, and a hair
-/// more (sample_side.h).
+/// If the surface runs through samples, the other end of a crossed edge is a whole voxel away from it: not
+/// below the width of a band of one voxel, but with a sign that only a leaf can store. In voxels, plus a hair
+/// (sample_side.h).
 constexpr double kEndOfEdge = 1.001;
 
 /// Widths of the band in world units.
@@ -38,8 +37,8 @@ struct Widths {
         end_of_edge(float(kEndOfEdge * voxel_size)) {}
 };
 
-/// Gives a leaf of distances its signs, and deactivates the voxels beyond the width of their side. Returns
-/// whether the leaf is still needed: it has an active voxel, or one that may be the end of a crossed edge.
+/// Signs a leaf of distances, and deactivates the voxels beyond the width of their side. Returns true if the
+/// leaf is still needed: it has an active voxel, or one that may be the end of a crossed edge.
 bool sign_leaf(FloatLeaf& leaf, const BlockMask& inside, const Widths& widths,
                const kernels::Kernels& kernels) {
   // A wider band has such ends among its active voxels.
@@ -53,21 +52,21 @@ bool sign_leaf(FloatLeaf& leaf, const BlockMask& inside, const Widths& widths,
   return has_end || !leaf.isEmpty();
 }
 
-/// A mesh in world units relative to the mesh's origin of triangles in voxels, each with corners of its own.
+/// Returns a mesh, in world units relative to the origin, of triangles in voxels, each with points of its
+/// own.
 PolygonMesh to_mesh(const std::vector<TriangleCorners>& triangles, double voxel_size) {
   PolygonMesh mesh;
   for (const TriangleCorners& t : triangles) {
     const std::uint32_t n = std::uint32_t(mesh.points.size());
-    for (std::size_t i = 0; i < 3; ++i)
-      mesh.points.push_back(Eigen::Map<const Eigen::Vector3d>(t.data() + 3 * i).cast<float>() *
-                            float(voxel_size));
+    for (const Eigen::Vector3d& corner : Facet(t).corner)
+      mesh.points.push_back(corner.cast<float>() * float(voxel_size));
     mesh.triangles.push_back({n, n + 1, n + 2});
   }
   return mesh;
 }
 
-/// Lowers the leaf's distances to `values`, and activates the voxels that are active there. The inactive
-/// voxels of either hold the reach, which is never the smaller one where the other is active.
+/// Lowers the leaf's distances to `values`, and activates the voxels in `active`. Inactive voxels have the
+/// reach, which is never less than an active voxel's distance.
 void lower(FloatLeaf& leaf, const float* values, const std::uint64_t* active) {
   float* own = leaf.buffer().data();
   for (unsigned i = 0; i < 512; ++i) own[i] = std::min(own[i], values[i]);
@@ -76,11 +75,11 @@ void lower(FloatLeaf& leaf, const float* values, const std::uint64_t* active) {
   leaf.setValueMask(mask);
 }
 
-/// Adds the distances to the caps of the holes, and the blocks that only a cap is near.
+/// Adds the distances to the caps of the holes, and the blocks that are near caps only.
 void add_caps(Signs& signs, double voxel_size, double reach, const BlockTable& table, Band& band,
               RunContext& context) {
-  // The caps are a mesh of their own with its own blocks; where the mesh has a leaf, too, the two bands
-  // merge, and a voxel keeps its nearest triangle even if the cap is nearer.
+  // The caps are a mesh with blocks of its own. If the mesh has a leaf, too, the two bands merge, and a voxel
+  // keeps its nearest triangle even if the cap is nearer.
   const PolygonMesh caps = to_mesh(signs.caps, voxel_size);
   const IndexSoup soup(caps, voxel_size);
   TriangleBins bins(soup, reach, context);
@@ -94,8 +93,8 @@ void add_caps(Signs& signs, double voxel_size, double reach, const BlockTable& t
       lower(*band.leaves[known], cap.buffer().data(), &mask.getWord<openvdb::Index64>(0));
       continue;
     }
-    // A block that the table has, but without a voxel near the mesh, is there twice from now on; only the new
-    // entry has a leaf.
+    // A block of the table without a voxel near the mesh exists twice from now on; only the new entry has a
+    // leaf.
     band.leaves.push_back(std::move(near_caps.leaves[i]));
     band.blocks.push_back(near_caps.blocks[i]);
     signs.inside.push_back(known != BlockTable::kNone ? BlockMask(signs.inside[known])
@@ -107,29 +106,26 @@ void add_caps(Signs& signs, double voxel_size, double reach, const BlockTable& t
   }
 }
 
-bool has(const BlockMask& bits, unsigned voxel) { return bits[voxel >> 6] >> (voxel & 63) & 1; }
-
-/// Replaces the distances of the leaf's voxels inside by those of `other`. Voxels outside keep theirs: a way
-/// from outside to an interior face passes the solid's boundary first, so the sheet is never the nearest to
-/// them.
+/// Replaces the distances of the leaf's voxels inside by those of `other`. Voxels outside keep theirs: every
+/// path from outside to an interior face crosses the solid's boundary first, so that the face is never the
+/// nearest.
 void replace_inside(FloatLeaf& leaf, const FoundLeaf& other, const BlockMask& inside, float reach) {
   FloatLeaf::NodeMaskType mask = leaf.getValueMask();
-  for (unsigned i = 0; i < 512; ++i) {
-    if (!has(inside, i)) continue;
+  for_each_bit(inside, [&](int i) {
     leaf.buffer().data()[i] = other.any ? other.values[i] : reach;
-    mask.set(i, other.any && (other.active[i >> 6] >> (i & 63) & 1));
-  }
+    mask.set(openvdb::Index32(i), other.any && test(other.active, i));
+  });
   leaf.setValueMask(mask);
 }
 
-/// Computes the distances of the voxels inside once more without what does not bound the solid. It goes leaf
-/// by leaf, since all of the new ones at once could outweigh a small volume.
+/// Computes the distances of the voxels inside again without the faces that do not bound the solid. Works
+/// leaf by leaf, since all new ones at once could take more memory than a small volume.
 InteriorFaces leave_out_interior_faces(const IndexSoup& soup, TriangleBins& bins, const Signs& signs,
                                        BandWork work, Band& band, RunContext& context) {
   InteriorFaces sheets = find_interior_faces(soup, bins, band, signs, work.reach, work.voxel_size, context);
   if (sheets.triangles.empty()) return sheets;
-  // First without any triangle that is inner, if only in part. Each call back writes to its own block's leaf,
-  // so that threads need no lock.
+  // First without all triangles that are inner, even if only in part. Each callback writes to its own block's
+  // leaf, so that threads need no lock.
   work.blocks = &sheets.blocks;
   work.without = &sheets.triangles;
   find_leaves(soup, bins, work, context, [&](const FoundLeaf& found) {
@@ -137,12 +133,11 @@ InteriorFaces leave_out_interior_faces(const IndexSoup& soup, TriangleBins& bins
     const BlockMask& inside = signs.inside[found.block];
     replace_inside(*band.leaves[found.block], found, inside, float(work.reach * work.voxel_size));
     if (!work.nearest || !found.any) return;
-    for (unsigned v = 0; v < 512; ++v)
-      if (has(inside, v)) (*band.nearest[found.block])[v] = found.nearest[v];
+    for_each_bit(inside, [&](int v) { (*band.nearest[found.block])[v] = found.nearest[v]; });
   });
   if (sheets.pieces.triangles.empty()) return sheets;
-  // Then the outer pieces of the triangles that were cut are put back. They lie within their triangles, so
-  // that whatever is within their reach has a block in `bins`.
+  // Then the outer pieces of the cut triangles are added again. They lie within their triangles, so that all
+  // blocks within their reach are in `bins`.
   const IndexSoup pieces(sheets.pieces, work.voxel_size);
   TriangleBins piece_bins(pieces, work.reach, context);
   work.blocks = work.without = nullptr;
@@ -159,7 +154,7 @@ InteriorFaces leave_out_interior_faces(const IndexSoup& soup, TriangleBins& bins
   return sheets;
 }
 
-/// The grid of the nearest triangles; its active voxels are those of the band's leaves.
+/// Returns the grid of the nearest triangles; its active voxels are those of the band's leaves.
 openvdb::Int32Grid::Ptr assemble_nearest(const Band& band) {
   using IntLeaf = openvdb::Int32Tree::LeafNodeType;
   const auto grid = openvdb::Int32Grid::create(-1);
@@ -174,29 +169,29 @@ openvdb::Int32Grid::Ptr assemble_nearest(const Band& band) {
   return grid;
 }
 
-/// The grid of the distances. It takes the leaves out of the band.
+/// Returns the grid of the distances. Moves the leaves out of the band.
 openvdb::FloatGrid::Ptr assemble_distance(Band& band, const Widths& widths, bool is_signed) {
   const auto grid = openvdb::FloatGrid::create(widths.exterior);
   for (std::unique_ptr<FloatLeaf>& leaf : band.leaves)
     if (leaf) grid->tree().addLeaf(leaf.release());
   grid->setName(is_signed ? "sdf" : "udf");
   if (!is_signed) return grid;
-  // The leaves are signed already, so the fill starts above them (level 1): it gives tiles between leaves the
-  // sign of the side they lie on, and its width.
+  // The leaves are signed already, so that the fill starts above them (level 1): it gives tiles between
+  // leaves the sign and the width of their side.
   openvdb::tools::signedFloodFillWithValues(grid->tree(), widths.exterior, -widths.interior, true, 1, 1);
   grid->setGridClass(openvdb::GRID_LEVEL_SET);
   return grid;
 }
 
-/// What the search for the sides found, beside the sides.
+/// The parts of the boundary that differ from the mesh.
 struct Boundary {
   bool is_signed = false;  ///< false when there is no inside
   InteriorFaces sheets;
   std::vector<TriangleCorners> caps;
 };
 
-/// Finds the sides and makes `band` signed. The order matters: the caps come after the interior faces, whose
-/// search replaces distances by those to the mesh alone; the signs last, once every distance is the least.
+/// Finds the sides and makes `band` signed. The order matters: the caps come after the interior faces, which
+/// replaces distances by those to the mesh only; the signs last, when every distance is the least.
 Boundary sign(const IndexSoup& soup, SignRule rule, const BandWork& work, TriangleBins& bins,
               const Widths& widths, Band& band, RunContext& context) {
   const Stage stage(context, "signs");
@@ -215,17 +210,12 @@ Boundary sign(const IndexSoup& soup, SignRule rule, const BandWork& work, Triang
   return boundary;
 }
 
-/// The mesh's triangles without the inner ones, the outer pieces of those, and the caps of its holes.
+/// Returns the mesh's triangles without the inner ones, the outer pieces of those, and the caps of its holes.
 BoundaryTriangles boundary_triangles(const IndexSoup& soup, const Boundary& boundary) {
   BoundaryTriangles result;
   result.points = soup.mesh().points;
-  // Both lists ascend, so that one walk finds the triangles that are left.
-  auto inner = boundary.sheets.triangles.begin();
   for (std::uint32_t t = 0; t < soup.size(); ++t) {
-    if (inner != boundary.sheets.triangles.end() && *inner == t) {
-      ++inner;
-      continue;
-    }
+    if (std::ranges::binary_search(boundary.sheets.triangles, t)) continue;
     result.triangles.push_back(soup.triangle(t));
     result.ids.push_back(std::int32_t(t));
   }
@@ -265,17 +255,17 @@ Voxelization voxelize_within(const PolygonMesh& mesh, const VoxelizeOptions& opt
   if (options.signs != SignRule::none) {
     boundary = sign(soup, options.signs, work, *bins, Widths(near, options.voxel_size), band, context);
   }
-  // From here on nobody asks for triangles by block; their memory is free before the tree grows.
+  // Their memory is free before the tree grows.
   bins.reset();
   Voxelization result;
   result.is_signed = boundary.is_signed;
   {
     const Stage stage(context, "tree");
-    // The triangles first: the distances take the leaves away.
+    // First, because the distances take the leaves.
     if (options.nearest) result.nearest = assemble_nearest(band);
     result.distance = assemble_distance(band, Widths(wide, options.voxel_size), result.is_signed);
   }
-  // Without signs `near` is as wide as asked.
+  // Without signs `near` has the requested widths.
   const bool is_wider = result.is_signed && (wide.exterior > near.exterior || wide.interior > near.interior);
   if (is_wider || (options.boundary && result.is_signed))
     result.boundary = boundary_triangles(soup, boundary);
@@ -291,12 +281,42 @@ Voxelization voxelize_within(const PolygonMesh& mesh, const VoxelizeOptions& opt
   return result;
 }
 
+// The caller has checked the value, so that any other value, or an input without options, is "auto".
+SignRule sign_rule(const Options& options) {
+  if (options.is("signs", "flood-fill")) return SignRule::flood_fill;
+  if (options.is("signs", "winding-number")) return SignRule::winding_number;
+  if (options.is("signs", "unsigned")) return SignRule::none;
+  if (options.is("signs", "auto-sheets")) return SignRule::automatic_sheets;
+  return SignRule::automatic;
+}
+
 }  // namespace
+
+std::vector<OptionSpec> hermesh_voxelizer_options() {
+  return {
+      {.name = "signs",
+       .fallback = "auto",
+       .help =
+           "inside is what infinity cannot reach, or what the polygons wind around; auto floods, and winds "
+           "where the flood leaks in; auto-sheets does not wind where that would close large holes",
+       .choices = {"auto", "auto-sheets", "flood-fill", "winding-number", "unsigned"}}};
+}
+
+VoxelizeOptions voxelize_options(const VoxelizationInput& input) {
+  return {.voxel_size = input.voxel_size,
+          .exterior_band = input.exterior_band,
+          .interior_band = input.interior_band,
+          .signs = sign_rule(input.options)};
+}
+
+LevelSet hermesh_voxelizer(const VoxelizationInput& input) {
+  return make_level_set(voxelize(input.mesh, voxelize_options(input), input.context).distance);
+}
 
 Voxelization voxelize(const PolygonMesh& mesh, const VoxelizeOptions& options, RunContext& context) {
   check_voxelization_fits(mesh, options.voxel_size, options.exterior_band, options.interior_band);
   initialize_openvdb();
-  // What is done when there is no inside: all space is outside, and as wide as the exterior band.
+  // Without an inside all space is outside, and as wide as the exterior band.
   VoxelizeOptions outside_only = options;
   outside_only.signs = SignRule::none;
   outside_only.interior_band = options.exterior_band;
@@ -306,8 +326,7 @@ Voxelization voxelize(const PolygonMesh& mesh, const VoxelizeOptions& options, R
   const BandWidths near =
       is_wide ? BandWidths{std::min(wide.exterior, kNearBand), std::min(wide.interior, kNearBand)} : wide;
   Voxelization result = voxelize_within(mesh, options, near, context);
-  // No inside was found. What is there already is right where the search went as far as the exterior band, no
-  // more and no less.
+  // If no inside was found, the result is right only if the search went exactly as far as the exterior band.
   const bool is_as_wide = !is_wide && wide.interior == wide.exterior && wide.exterior >= kEndOfEdge;
   if (result.is_signed || is_as_wide) return result;
   return voxelize_within(mesh, outside_only, exterior, context);

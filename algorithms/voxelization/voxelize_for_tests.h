@@ -1,4 +1,4 @@
-// Solids for the tests of voxelize(), and what they ask of its outcome. Faces look outwards.
+// Solids for the tests of voxelize(), with faces that look outwards, and functions that check its result.
 #pragma once
 
 #include <Eigen/Core>
@@ -47,6 +47,12 @@ inline PolygonMesh box(const Vector3d& low, const Vector3d& high) {
             .cast<float>());
   mesh.quads = {{0, 2, 3, 1}, {4, 5, 7, 6}, {0, 1, 5, 4}, {2, 6, 7, 3}, {0, 4, 6, 2}, {1, 3, 7, 5}};
   return mesh;
+}
+
+/// Returns the exact signed distance from p to a box, negative inside.
+inline double to_box(const Vector3d& p, const Vector3d& low, const Vector3d& high) {
+  const Vector3d out = (low - p).cwiseMax(p - high);
+  return out.cwiseMax(0.0).norm() + std::min(out.maxCoeff(), 0.0);
 }
 
 inline void append(PolygonMesh& mesh, const PolygonMesh& other, bool turned = false) {
@@ -106,6 +112,23 @@ inline PolygonMesh opened(double radius, double cut) {
     return mesh.points[t[0]].z() > cut && mesh.points[t[1]].z() > cut && mesh.points[t[2]].z() > cut;
   });
   return mesh;
+}
+
+/// Returns the winding number at p, in voxels, as a sum over all triangles by the formula of van Oosterom &
+/// Strackee in double precision; `scale` is in voxels per unit of the points.
+inline double exact_winding_number(std::span<const Eigen::Vector3f> points,
+                                   std::span<const Triangle> triangles, double scale,
+                                   const Eigen::Vector3d& p) {
+  double half = 0.0;
+  for (const Triangle& t : triangles) {
+    const Eigen::Vector3d a = points[t[0]].cast<double>() * scale - p;
+    const Eigen::Vector3d b = points[t[1]].cast<double>() * scale - p;
+    const Eigen::Vector3d c = points[t[2]].cast<double>() * scale - p;
+    const double la = a.norm(), lb = b.norm(), lc = c.norm();
+    half +=
+        std::atan2((b - a).cross(c - a).dot(a), la * lb * lc + a.dot(b) * lc + b.dot(c) * la + c.dot(a) * lb);
+  }
+  return half * 0.5 * std::numbers::inv_pi;
 }
 
 }  // namespace hermesh::voxelize_for_tests

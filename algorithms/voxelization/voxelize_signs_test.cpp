@@ -1,5 +1,4 @@
-// On which side of the polygons voxelize() says that samples are: shells, holes, clefts, and meshes without
-// an inside.
+// The signs that voxelize() gives to samples: shells, holes, crevices, and meshes without an inside.
 #include <gtest/gtest.h>
 
 #include <Eigen/Geometry>
@@ -10,7 +9,7 @@
 #include "algorithms/voxelization/voxelize_for_tests.h"
 
 namespace hermesh {
-namespace {
+namespace voxelize_signs_test {
 
 using Eigen::Vector3d;
 using Eigen::Vector3f;
@@ -51,7 +50,7 @@ TEST(VoxelizeSigns, AShellThatFacesOutwardsWithinASolidIsFilled) {
   PolygonMesh mesh = sphere({0, 0, 0}, 20.0);
   append(mesh, sphere({0, 0, 0}, 12.0));
   EXPECT_LT(at(run(mesh), 0, 0, 0), 0.0);
-  // What boxes enclose between them has no shell of its own.
+  // A cavity that boxes enclose between them has no shell of its own.
   PolygonMesh room = box({-10, -10, -10}, {10, 10, -7});
   append(room, box({-10, -10, 7}, {10, 10, 10}));
   append(room, box({-10, -10, -8}, {10, -7, 8}));
@@ -92,7 +91,7 @@ TEST(VoxelizeSigns, AutomaticSignsCloseAHole) {
     }
 }
 
-/// Its samples have coordinates of both signs, which a cut towards 0 instead of down once mixed up.
+/// Its samples have coordinates of both signs, which truncation towards 0 instead of down once confused.
 TEST(VoxelizeSigns, TheSurfaceAcrossAHoleDoesNotDependOnWhereTheHoleIs) {
   // The border is a saddle's, so that the surface across is bent.
   PolygonMesh here = sphere({0, 0, 0}, 9.0, 48);
@@ -134,7 +133,7 @@ TEST(VoxelizeSigns, AVoxelAtTheBottomOfACreviceIsOutside) {
 
 TEST(VoxelizeSigns, VoxelsOneBehindTheOtherInASlitAreOutside) {
   // Between two boxes 0.2 to 0.4 voxel apart, which no grid edge goes along: a voxel deep in the slit sees
-  // others in it, and only those at its mouth see what is around the boxes.
+  // others in it, and only those at its mouth see the space around the boxes.
   for (int turn = 0; turn < 3; ++turn) {
     const Eigen::Matrix3d rotation =
         (Eigen::AngleAxisd(0.5 + 0.13 * turn, Vector3d::UnitX()) * Eigen::AngleAxisd(0.3, Vector3d::UnitY()))
@@ -161,7 +160,7 @@ TEST(VoxelizeSigns, VoxelsOneBehindTheOtherInASlitAreOutside) {
 
 TEST(VoxelizeSigns, AVoxelThatOnlyAWayWithABendLeadsToIsOutside) {
   // A chamber around (0, 0, z) with a narrow passage that turns twice before it ends at y = 8.2; no straight
-  // way leads through it. Plugged, it is a cavity.
+  // segment leads through it. Plugged, it is a cavity.
   const auto block = [](double gap, bool plugged) {
     PolygonMesh mesh = box({-8.2, -8.2, -6.3}, {-0.3, 8.2, 6.3});
     append(mesh, box({-0.5, -8.2, -6.3}, {8.2, -0.3, 6.3}));
@@ -250,5 +249,5 @@ TEST(VoxelizeSigns, WithoutAnInsideThereIsNoSign) {
   EXPECT_LT(compare(strip, v, 1.0, 3.0, 5).worst, 1e-5);
 }
 
-}  // namespace
+}  // namespace voxelize_signs_test
 }  // namespace hermesh

@@ -1,22 +1,25 @@
 #include "algorithms/voxelization/voxelize.h"
 
 #include <gtest/gtest.h>
-#include <openvdb/tools/ValueTransformer.h>
 #include <tbb/global_control.h>
+#include <unistd.h>
 
 #include <Eigen/Geometry>
 #include <cmath>
 #include <cstdlib>
 #include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <iomanip>
 #include <numbers>
 #include <random>
 
-#include "algorithms/core/level_set_grid.h"
+#include "algorithms/io/mesh_file.h"
 #include "algorithms/lattice/simd/simd_level.h"
 #include "algorithms/voxelization/voxelize_for_tests.h"
 
 namespace hermesh {
-namespace {
+namespace voxelize_test {
 
 using Eigen::Vector3d;
 using Eigen::Vector3f;
@@ -100,7 +103,7 @@ TEST(Voxelize, ManySmallTrianglesAreExact) {
 }
 
 TEST(Voxelize, SamplesBeyondTheBandHaveItsWidth) {
-  // Not nearly: OpenVDB's tools, and stencils, tell what is no data by comparing it with the background.
+  // Exactly, for OpenVDB's tools, and stencils, compare with the background to detect missing data.
   std::mt19937 random(20110411);
   std::uniform_real_distribution<double> size(1e-3, 1.0);
   for (int i = 0; i < 40; ++i) {
@@ -170,7 +173,7 @@ TEST(Voxelize, UnionOfOverlappingSpheres) {
     const openvdb::Coord c = voxel.getCoord();
     const double x = std::abs(c.x()), rho = std::hypot(double(c.y()), double(c.z()));
     const double outside = std::hypot(x - apart, rho) - radius;
-    // Inside, the nearest place is on the sphere of this half space, or on the circle where the spheres meet.
+    // Inside, the nearest point is on the sphere of this half space, or on the circle where the spheres meet.
     const double seam = std::hypot(x, rho - std::sqrt(radius * radius - apart * apart));
     const bool sphere_is_nearest =
         std::hypot(x - apart, rho) > 0 && x * radius >= apart * (radius - std::hypot(x - apart, rho));
@@ -226,7 +229,7 @@ TEST(Voxelize, UnionOfABoxAndATurnedOne) {
     const double truth = std::min(distance(p, half), distance(turn.transpose() * p, turned_half));
     outside += truth > 0;
     wrong += truth > 0 ? std::abs(*voxel - truth) > 1e-3 : *voxel > 1e-3;
-    // Inside, the surface is no nearer than that of the box that the place is deeper in.
+    // Inside, the surface is no nearer than that of the box in which the point is deeper.
     if (truth <= 0) nearest = std::max(nearest, *voxel - truth);
     stray += truth < -3.11;
   }
@@ -242,7 +245,7 @@ TEST(Voxelize, InsideTwoBoxesThatCrossDistancesAreThoseToTheirUnion) {
   PolygonMesh mesh = box(low[0], high[0]);
   append(mesh, box(low[1], high[1]));
   const Voxelization v = run(mesh);
-  // What is outside is boxes between the planes of all sides.
+  // The outside consists of boxes between the planes of all sides.
   std::array<std::vector<double>, 3> planes;
   for (int a = 0; a < 3; ++a) {
     planes[std::size_t(a)] = {-100, low[0][a], low[1][a], high[0][a], high[1][a], 100};
@@ -299,7 +302,7 @@ TEST(Voxelize, InsideATorusThatCrossesItselfDistancesAreThoseToItsOuterPart) {
     const double rho = std::hypot(c.x() - 0.31, c.y() + 0.17), z = c.z() - 0.23;
     const double from_circle = std::hypot(rho - kMajor, z);
     if (from_circle > kMinor) continue;
-    const double hit = kMajor + (rho - kMajor) * kMinor / from_circle;  // of the ray through the place
+    const double hit = kMajor + (rho - kMajor) * kMinor / from_circle;  // of the ray through the point
     const double truth = hit >= 0 ? kMinor - from_circle : std::hypot(rho, std::abs(z) - tip);
     ++inside;
     // Facets of two sides of the axis cross it together, and leave dents at the tips.
@@ -325,6 +328,167 @@ TEST(Voxelize, SaysWhereTrianglesCrossMoreOftenThanThereAreSamples) {
       std::ranges::count_if(
           context.notes, [](const std::string& note) { return note.find("cross one another") != note.npos; }),
       1);
+}
+
+// ---- Random soups, compared with the nearest triangle that a tree finds.
+
+class Soups {
+ public:
+  explicit Soups(std::uint64_t seed) : random_(seed) {}
+
+  PolygonMesh next() {
+    PolygonMesh mesh;
+    const int kind = int(random_() % 8), n = 1 + int(random_() % 24);
+    for (int i = 0; i < n; ++i) {
+      const Vector3d a = point(12), b = kind == 3 ? a : Vector3d(a + point(kind == 5 ? 60 : 6));
+      Vector3d c = a + point(6);
+      if (kind == 1) c = 0.5 * (a + b) + 1e-4 * point(1);  // slivers
+      if (kind == 2) c = a + 0.3 * (b - a);                // segments
+      if (kind == 3) c = a;                                // points
+      if (kind == 4) c = a + 1e-6 * point(1);              // needles
+      if (kind == 6) {
+        for (const Vector3d& v : {a, b, c}) add_whole(mesh, v);  // corners on voxels
+      }
+      if (kind != 6) add_triangle(mesh, a, b, c);
+      if (kind == 7) add_triangle(mesh, a, c, b);  // coincident
+    }
+    if (kind == 6) {
+      mesh.triangles.clear();
+      for (std::uint32_t i = 0; i + 2 < mesh.points.size(); i += 3)
+        mesh.triangles.push_back({i, i + 1, i + 2});
+    }
+    if (random_() % 4 == 0) mesh.origin = Vector3d(1e7, -3e8, 12345.678);
+    return mesh;
+  }
+  double band() { return std::array{1.0, 1.5, 3.0, 4.25}[random_() % 4]; }
+  double voxel_size() { return std::array{1.0, 0.37, 2.9}[random_() % 3]; }
+
+ private:
+  Vector3d point(double size) {
+    std::uniform_real_distribution<double> uniform(-size, size);
+    const double x = uniform(random_), y = uniform(random_);
+    return {x, y, uniform(random_)};
+  }
+  static void add_whole(PolygonMesh& mesh, const Vector3d& v) {
+    mesh.points.push_back(v.array().round().matrix().cast<float>());
+  }
+  std::mt19937_64 random_;
+};
+
+/// Compares the bands of `count` random soups with the nearest triangles, one by one.
+void check_soups(int count, unsigned seed) {
+  Soups soups(seed);
+  std::size_t checked = 0;
+  for (int i = 0; i < count; ++i) {
+    const PolygonMesh mesh = soups.next();
+    const double band = soups.band(), voxel_size = soups.voxel_size();
+    RunContext context;
+    const Voxelization v = voxelize(
+        mesh,
+        {.voxel_size = voxel_size, .exterior_band = band, .interior_band = band, .signs = SignRule::none},
+        context);
+    // A random sample of the box, or the whole of it where it is small, keeps this to seconds.
+    const std::vector<Triangle> triangles = triangulated(mesh);
+    const TriangleTree tree(mesh.points, triangles, 1.0 / voxel_size);
+    const auto accessor = v.distance->getConstAccessor();
+    std::size_t looked = 0;
+    for (auto voxel = v.distance->cbeginValueAll(); voxel && looked < 60000; ++voxel) {
+      if (!voxel.isVoxelValue()) continue;
+      if (++looked % 37 != std::size_t(i % 37)) continue;
+      const openvdb::Coord c = voxel.getCoord();
+      const double truth = std::sqrt(tree.nearest(Vector3d(c.x(), c.y(), c.z())).squared);
+      ++checked;
+      if (voxel.isValueOn()) {
+        ASSERT_NEAR(*voxel / voxel_size, truth, 1e-5) << "soup " << i << " at " << c;
+      } else {
+        ASSERT_GT(truth, band - 1e-4) << "soup " << i << " at " << c;
+      }
+    }
+    // And every leaf is there: around each corner the band is active.
+    for (const Triangle& t : triangles)
+      for (const std::uint32_t p : t) {
+        const Vector3d at = mesh.points[p].cast<double>() / voxel_size;
+        const openvdb::Coord c(int(std::lround(at.x())), int(std::lround(at.y())), int(std::lround(at.z())));
+        ASSERT_TRUE(accessor.isValueOn(c)) << "soup " << i;
+      }
+  }
+  EXPECT_GT(checked, 50u * std::size_t(count));
+}
+
+/// Its corners are collinear except for rounding, so that its normal is noise, which must not lose either
+/// end.
+TEST(Voxelize, ANeedleHasTheBandAroundBothEnds) {
+  PolygonMesh needle;
+  needle.points = {{1.9281562566757202f, 0.71781373023986816f, 2.6251864433288574f},
+                   {-2.2653148174285889f, -0.73634469509124756f, 4.4785332679748535f},
+                   {0.67011493444442749f, 0.28156620264053345f, 3.1811904907226562f}};
+  needle.triangles = {{0, 1, 2}};
+  RunContext context;
+  const Voxelization v = voxelize(
+      needle, {.voxel_size = 0.37, .exterior_band = 1.5, .interior_band = 1.5, .signs = SignRule::none},
+      context);
+  const auto accessor = v.distance->getConstAccessor();
+  for (int step = 0; step <= 100; ++step) {
+    const Eigen::Vector3f at = needle.points[0] + 0.01f * float(step) * (needle.points[1] - needle.points[0]);
+    const Eigen::Vector3d voxels = at.cast<double>() / 0.37;
+    const openvdb::Coord c(int(std::lround(voxels.x())), int(std::lround(voxels.y())),
+                           int(std::lround(voxels.z())));
+    EXPECT_TRUE(accessor.isValueOn(c)) << c;
+  }
+}
+
+TEST(Voxelize, ThreeHundredSoupsAreExact) { check_soups(300, 20111); }
+TEST(Slow, TwentyThousandSoupsAreExact) { check_soups(20000, 20112); }
+
+// ---- Placement in the world, far from the origin above all.
+
+/// A box whose coordinates went through a file of decimal numbers.
+PolygonMesh box_from_file(const Vector3d& low, const Vector3d& high) {
+  const auto path =
+      std::filesystem::temp_directory_path() / ("hermesh-placement-" + std::to_string(getpid()) + ".obj");
+  {
+    std::ofstream file(path);
+    file << std::setprecision(17);
+    for (int i = 0; i < 8; ++i)
+      file << "v " << (i & 1 ? high : low).x() << ' ' << (i & 2 ? high : low).y() << ' '
+           << (i & 4 ? high : low).z() << '\n';
+    file << "f 1 3 4 2\nf 5 6 8 7\nf 1 2 6 5\nf 3 7 8 4\nf 1 5 7 3\nf 2 4 8 6\n";
+  }
+  RunContext context;
+  const PolygonMesh mesh = read_mesh(path, context);
+  std::filesystem::remove(path);
+  return mesh;
+}
+
+TEST(Placement, ObjectOfSizeOneAMillionAwayKeepsWhatTheFileHolds) {
+  // A thousandth of a voxel is 1e-5 here, and single precision at a million has steps of 0.06.
+  const Vector3d low(1e6 + 0.10437, -2e6 + 0.20591, 3e6 + 0.30113),
+      high = low + Vector3d(1.00217, 0.80541, 0.9);
+  const PolygonMesh mesh = box_from_file(low, high);
+  RunContext context;
+  const Voxelization result = voxelize(mesh, {.voxel_size = 0.01}, context);
+  const openvdb::math::Transform& transform = result.distance->transform();
+  std::size_t inside = 0;
+  for (auto value = result.distance->cbeginValueOn(); value; ++value) {
+    const openvdb::Vec3d at = transform.indexToWorld(value.getCoord());
+    ASSERT_NEAR(*value, to_box({at[0], at[1], at[2]}, low, high), 3e-7) << value.getCoord();
+    inside += *value < 0 ? 1 : 0;
+  }
+  EXPECT_GT(inside, 100'000u);
+}
+
+TEST(Placement, OriginOfTheMeshMovesTheTransformAlone) {
+  const PolygonMesh near = box_from_file({0.1, 0.2, 0.3}, {1.1, 0.9, 1.3});
+  PolygonMesh far = near;
+  far.origin = {1e6, -2.5e6, 1e9};
+  RunContext context;
+  const Voxelization here = voxelize(near, {.voxel_size = 0.02}, context),
+                     there = voxelize(far, {.voxel_size = 0.02}, context);
+  ASSERT_TRUE(here.distance->tree().hasSameTopology(there.distance->tree()));
+  for (auto a = here.distance->tree().cbeginLeaf(), b = there.distance->tree().cbeginLeaf(); a; ++a, ++b)
+    ASSERT_EQ(std::memcmp(a->buffer().data(), b->buffer().data(), 512 * sizeof(float)), 0);
+  const openvdb::Vec3d first = there.distance->transform().indexToWorld(openvdb::Coord(0, 0, 0));
+  EXPECT_EQ(first, openvdb::Vec3d(1e6, -2.5e6, 1e9));
 }
 
 // ---- The same bytes.
@@ -375,5 +539,5 @@ TEST(Voxelize, CancelEndsIt) {
   EXPECT_THROW(voxelize(sphere({0, 0, 0}, 30), {}, context), Cancelled);
 }
 
-}  // namespace
+}  // namespace voxelize_test
 }  // namespace hermesh

@@ -1,37 +1,21 @@
 // Equation 7.1 of the thesis against the rule of signs: a model less a copy of itself that is moved aside.
 // Both results are meshed from the same 10 bytes by the same extraction, so that the rule alone differs:
 // eq. 7.1 combines the bytes, and the rule of signs combines the exact data, which are packed then.
-#include <algorithm>
-#include <sstream>
 
 #include "algorithms/hermite/combine.h"
-#include "algorithms/hermite/dense/dense_combine.h"
 #include "algorithms/hermite/samplers.h"
 #include "algorithms/thesis/adaptive_dual_contouring/adaptive_dual_contouring.h"
-#include "experiments/ablations/boolean_rule.h"
+#include "algorithms/thesis/voxels/dense_hermite.h"
 #include "experiments/harness/cell.h"
-#include "experiments/harness/run_cells.h"
-#include "experiments/pipeline.h"
 
 namespace hermesh {
 namespace {
 
-/// Models of the tiers, of which parts of CAD have faces along the lattice and scans have not.
-constexpr const char* kFewModels = "torus fandisk";
-constexpr const char* kRuleModels =
-    "turned-cube fandisk rocker-arm joint casting nefertiti bunny-closed armadillo";
 constexpr const char* kPrintedRule = "eq. 7.1";
 constexpr const char* kSigns = "signs";
 
-std::vector<std::string> words_in(const std::string& text) {
-  std::istringstream stream(text);
-  std::vector<std::string> words;
-  for (std::string word; stream >> word;) words.push_back(word);
-  return words;
-}
-
-/// The mesh moved by shares of its longest side that are no whole number of voxels, on the same origin and so
-/// the same lattice.
+/// Returns the mesh moved by shares of its longest side that are not whole numbers of voxels, with the same
+/// origin and thus on the same lattice.
 PolygonMesh moved_aside(PolygonMesh mesh) {
   const Eigen::Vector3f shares(0.231f, 0.117f, 0.071f);
   const auto longest = static_cast<float>(bounds(mesh).size().maxCoeff());
@@ -54,9 +38,9 @@ MeasuredRow row_of(const std::string& model, const std::string& resolution, cons
                    const ThesisDense& difference, const RunContext& context) {
   MeasuredRow row{"difference", label_of(model, resolution, level)};
   RunContext child = child_context(context, false);
-  // Threshold 0 merges nothing, so that merging cannot hide what a rule left.
+  // Threshold 0 merges nothing, so that merging cannot hide the defects that a rule left.
   const PolygonMesh mesh = adaptive_dual_contouring(difference, {.threshold = 0.0}, nullptr, child);
-  validation::JudgeOptions options = kPromisesAlone;
+  validation::CheckOptions options = kPromisesAlone;
   options.self_intersections = false;
   const auto& [report, check] = judge(to_mesh_file(mesh), Promises{}, options, child);
   row.values = {{"model", model},
@@ -69,6 +53,8 @@ MeasuredRow row_of(const std::string& model, const std::string& resolution, cons
     if (figure == "lost_crossings" || figure == "needless_crossings") row.values[figure] = value;
   return row;
 }
+
+}  // namespace
 
 std::vector<MeasuredRow> measure_boolean_rule(const MeasurementInput& input) {
   std::vector<MeasuredRow> rows;
@@ -95,29 +81,6 @@ std::vector<MeasuredRow> measure_boolean_rule(const MeasurementInput& input) {
     }
   }
   return rows;
-}
-
-}  // namespace
-
-Measurement boolean_rule_measurement() {
-  return {
-      .name = "boolean-rule",
-      .summary = "a model less a copy of itself, by eq. 7.1 and by the rule of signs",
-      .parameters =
-          {{"models", kFewModels, "cases", {kFewModels, kRuleModels}},
-           {"resolutions", "48", "voxels along the longest side", {"48", "96", "192", "48 96 192"}}},
-      .tables = {{"difference",
-                  "a model less a copy of itself that is moved aside",
-                  "model, voxels, rule",
-                  {{"model", "model", "case"},
-                   {"resolution", "voxels", "along its longest side"},
-                   {"level", "rule", "of the combination"},
-                   {"triangles", "triangles", "of the mesh of the difference, nothing merged"},
-                   {"open", "open", "boundary edges"},
-                   {"flipped", "flipped", "inconsistently oriented edges"},
-                   {"lost_crossings", "lost", "edges whose ends differ in sign and that have no data"},
-                   {"needless_crossings", "needless", "edges with data whose ends do not differ in sign"}}}},
-      .measure = measure_boolean_rule};
 }
 
 }  // namespace hermesh

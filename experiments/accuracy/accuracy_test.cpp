@@ -8,13 +8,10 @@
 #include "experiments/accuracy/exact_data.h"
 #include "experiments/accuracy/exact_shapes.h"
 #include "experiments/accuracy/mesh_errors.h"
-#include "experiments/accuracy/normal_code_order.h"
-#include "experiments/accuracy/optimal_triangles.h"
 #include "experiments/accuracy/orders.h"
-#include "experiments/accuracy/slope_fit.h"
 
 namespace hermesh {
-namespace {
+namespace accuracy_test {
 
 using Eigen::Vector3d;
 using std::numbers::pi;
@@ -32,7 +29,7 @@ double volume_of(const PolygonMesh& mesh) {
   return volume;
 }
 
-/// Places near the surface, inside and outside.
+/// Points near the surface, inside and outside.
 std::vector<Vector3d> places(const ExactShape& shape, int count) {
   std::mt19937 generator(7);
   std::uniform_real_distribution<double> coordinate(-1.2, 1.2);
@@ -287,5 +284,5 @@ TEST(NormalCodeOrder, EveryCodeIsOfFirstOrderAndTheOneInUse) {
   }
 }
 
-}  // namespace
+}  // namespace accuracy_test
 }  // namespace hermesh

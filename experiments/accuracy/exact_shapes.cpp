@@ -307,8 +307,8 @@ class Cube final : public ExactShape {
 class Gyroid final : public ExactShape {
  public:
   SurfacePlace nearest(const Vector3d& p) const override {
-    // Newton's method finds one of the places where the way to p is normal to the surface, so it starts from
-    // several.
+    // Newton's method finds one of the points at which the vector to p is normal to the surface, so it is
+    // started from several points.
     std::optional<Vector3d> best;
     for (int start = 0; start < 7 || (!best && start < kMostStarts); ++start) {
       Vector3d from = p;
@@ -357,8 +357,9 @@ class Gyroid final : public ExactShape {
   PolygonMesh facets(double) const override { return {}; }
 
  private:
-  /// A place q of the surface with q - p + m ∇g(q) = 0, or none: a first guess from the gradient at `start`,
-  /// then Newton's method for all four unknowns, which doubles the digits in each step.
+  /// Returns a point q of the surface with q - p + m ∇g(q) = 0, or none: a first guess from the gradient at
+  /// `start`, then Newton's method for all four unknowns, which doubles the number of correct digits in each
+  /// step.
   static std::optional<Vector3d> foot(const Vector3d& p, const Vector3d& start) {
     Vector3d q = start;
     for (int i = 0; i < 3; ++i) q -= value(q) / std::max(gradient(q).squaredNorm(), 0.1) * gradient(q);

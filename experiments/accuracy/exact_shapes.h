@@ -1,6 +1,6 @@
 // Shapes of which everything is known in closed form: the truth that orders of accuracy are measured against.
 //
-// A mesh is mostly judged against polygons, and then the polygons' own error hides the mesh's. Here the
+// A mesh is usually compared with polygons, and then the polygons' own error hides the mesh's. Here the
 // distance from any point, the nearest point, normal and curvature there, area, volume and creases are those
 // of the surface itself (the method of manufactured solutions: Etiene et al., Verifiable Visualization for
 // Isosurface Extraction, 2009).
@@ -18,7 +18,7 @@
 
 namespace hermesh {
 
-/// A place on a surface. Curvatures are positive where a solid is convex.
+/// A point on a surface. Curvatures are positive where a solid is convex.
 struct SurfacePlace {
   Eigen::Vector3d point, normal;  ///< the normal has unit length and points outwards
   double mean_curvature = 0.0;    ///< half the sum of the principal curvatures
@@ -30,8 +30,8 @@ class ExactShape {
  public:
   virtual ~ExactShape() = default;
 
-  /// The nearest place of the surface, one of them where there are several. On a crease the normal is that of
-  /// the face beside it which `p` is farther above.
+  /// Returns the nearest point of the surface, or one of them if there are several. On a crease, the normal
+  /// is that of the adjacent face that `p` is farther above.
   virtual SurfacePlace nearest(const Eigen::Vector3d& p) const = 0;
   /// Signed distance to the surface, negative inside; exact where |distance| is below exact_within().
   virtual double distance(const Eigen::Vector3d& p) const = 0;
@@ -46,14 +46,14 @@ class ExactShape {
 
   /// True where normals jump along creases.
   virtual bool is_sharp() const { return false; }
-  /// True where all of the surface is flat, so that polygons and Hermite data say all there is.
+  /// True where all of the surface is flat, so that polygons and Hermite data represent it exactly.
   virtual bool is_flat() const { return false; }
   /// Points of all creases, `spacing` apart or less.
   virtual std::vector<Eigen::Vector3d> crease_points(double /*spacing*/) const { return {}; }
   virtual std::vector<Eigen::Vector3d> corners() const { return {}; }
 
-  /// Part of space in which the surface is the one that is described; all of it but for shapes that had to be
-  /// cut off.
+  /// Part of space in which the surface is the one that is described; all of it except for shapes that had to
+  /// be cut off.
   virtual bool describes(const Eigen::Vector3d& /*p*/) const { return true; }
 
   /// Triangles with all corners on the surface and sides of about `length`, closed and oriented outwards,
@@ -67,10 +67,10 @@ class ExactShape {
 /// by a ball of 1.25 and described within 0.75, has no closed distance: the nearest point is found by
 /// Newton's method on the conditions of Lagrange, to rounding.
 std::span<const char* const> exact_shape_names();
-/// @throws Error for a name that there is not.
+/// @throws Error for an unknown name.
 std::shared_ptr<const ExactShape> exact_shape(const std::string& name);
 
-/// A shape that was turned and moved: what it says is in world coordinates.
+/// A rotated and translated shape: its results are in world coordinates.
 class PlacedShape {
  public:
   PlacedShape(std::shared_ptr<const ExactShape> shape, const Eigen::Isometry3d& to_world)

@@ -1,14 +1,9 @@
-// hermesh remesh --error on many models: each outcome certified by the judge, or refused with a place.
-#include <algorithm>
+// hermesh remesh --error on many models: each mesh is certified by validation, or refused with a reason.
 #include <chrono>
-#include <sstream>
 
 #include "algorithms/core/quad_diagonals.h"
 #include "algorithms/remesh/bounded_remesh.h"
 #include "experiments/harness/cell.h"
-#include "experiments/harness/measurement.h"
-#include "experiments/harness/run_cells.h"
-#include "experiments/pipeline.h"
 
 namespace hermesh {
 namespace {
@@ -24,20 +19,13 @@ constexpr const char* kAll =
     "openscad motor-bike dragon dragon-res2 chair moebius all-degenerate turned-cube cube leaning-cube torus "
     "nested-spheres overlapping-spheres cylinder cad-part holed-sphere plate";
 
-std::vector<std::string> parts_of(const std::string& text, char separator) {
-  std::istringstream in(text);
-  std::vector<std::string> parts;
-  for (std::string part; std::getline(in, part, separator);) parts.push_back(part);
-  return parts;
-}
-
 class BoundedMeasurer {
  public:
   explicit BoundedMeasurer(const MeasurementInput& input) : input_(input) {}
 
   void run() {
-    const std::vector<std::string> percents = parts_of(input_.parameters.text("percents"), '-');
-    for (const std::string& name : parts_of(input_.parameters.is("models", "few") ? kFew : kAll, ' ')) {
+    const std::vector<std::string> percents = words_in(input_.parameters.text("percents"), '-');
+    for (const std::string& name : words_in(input_.parameters.is("models", "few") ? kFew : kAll)) {
       const auto label = [&](const std::string& percent) { return name + ", " + percent + " %"; };
       if (std::ranges::none_of(percents, [&](const auto& p) { return input_.wants("bounded", label(p)); }))
         continue;
@@ -52,9 +40,7 @@ class BoundedMeasurer {
         row.values["percent"] = std::stod(percent);
         if (const auto failure = attempt([&] { measure(mesh, std::stod(percent) / 100.0, row); }))
           row.values["outcome"] = "refused: " + *failure;
-        std::vector<MeasuredRow> rows;
-        rows.push_back(std::move(row));
-        input_.emit(std::move(rows));
+        input_.emit({std::move(row)});
       }
     }
   }
@@ -94,7 +80,7 @@ class BoundedMeasurer {
                      MeasuredRow& row) {
     RunContext child = child_context(input_.context, false);
     const MeshFile reference = to_mesh_file(mesh);
-    const validation::JudgeOptions judging{.libraries = false,
+    const validation::CheckOptions judging{.libraries = false,
                                            .reference = &reference,
                                            .samples = std::int64_t(input_.parameters.number("samples")),
                                            .certify = true,
@@ -111,7 +97,7 @@ class BoundedMeasurer {
     for (const std::string& broken : judged.promises.broken) row.broken.push_back(broken);
     if (!options.over_holes && report.certified_to_reference->lower > made.to_surface)
       row.broken.push_back("the mesh is farther from the polygons than was proved");
-    // Polygons that bound nothing need not be near, and the judge measures from all.
+    // Polygons that bound nothing need not be near, and the validator measures from all polygons.
     if (made.left_out_area + made.free_area <= 1e-6 * report.area &&
         report.certified_from_reference->lower > made.from_surface)
       row.broken.push_back("the polygons are farther from the mesh than was proved");
@@ -122,43 +108,9 @@ class BoundedMeasurer {
 
 }  // namespace
 
-Measurement bounded_measurement() {
-  return {
-      .name = "bounded",
-      .summary = "meshes within a stated distance of the polygons, or the reason why not",
-      .parameters =
-          {{"models", "few", "few, generated, or all, with those of the data folder", {"few", "all"}},
-           {"percents", "1", "errors, percent of the diagonal", {"1", "0.1", "0.03", "1-0.1", "1-0.1-0.03"}},
-           {"samples", "100000", "of the judge, on each surface", {}, 1000, 1e8}},
-      .tables =
-          {{.name = "bounded",
-            .title = "remesh --error",
-            .first_column = "model",
-            .columns =
-                {{"percent", "error [%]", "asked for, of the diagonal of the polygons' box"},
-                 {"outcome", "outcome", "certified, or the sentence that refuses it"},
-                 {"input_triangles", "of input", "triangles of the input"},
-                 {"triangles", "triangles", "triangles of the mesh"},
-                 {"seconds", "time [s]", "seconds, both tries where holes had to be allowed"},
-                 {"voxel", "voxel", "edge of the last voxel, in errors"},
-                 {"rounds", "rounds", "how often voxels or tolerances were made smaller"},
-                 {"to", "to", "proved distance of the mesh from the polygons, in errors"},
-                 {"from", "from", "proved distance of the polygons from the mesh, in errors"},
-                 {"judged_to", "judged to", "the judge's upper bound of that distance of the mesh"},
-                 {"judged_from", "judged from",
-                  "the judge's upper bound of the distance of all polygons, those that bound nothing too"},
-                 {"sampled_to", "sampled to", "the largest distance of the judge's samples of the mesh"},
-                 {"sampled_from", "sampled from",
-                  "the largest distance of the judge's samples of the polygons"},
-                 {"watertight", "watertight",
-                  "whether the judge finds it closed, manifold and free of crossings"},
-                 {"left_out", "left out", "area of polygons that bound nothing, world units²"},
-                 {"holes", "holes", "area of the caps of holes, world units²"}},
-            .additive = true}},
-      .measure = [](const MeasurementInput& input) {
-        BoundedMeasurer(input).run();
-        return std::vector<MeasuredRow>();
-      }};
+std::vector<MeasuredRow> measure_bounded(const MeasurementInput& input) {
+  BoundedMeasurer(input).run();
+  return std::vector<MeasuredRow>();
 }
 
 }  // namespace hermesh

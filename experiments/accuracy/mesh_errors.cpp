@@ -35,9 +35,9 @@ constexpr double kMiddle = 9.0 / 40.0;
 constexpr std::array<std::array<double, 2>, 2> kTriples = {
     {{(6 - kRoot15) / 21, (155 - kRoot15) / 1200}, {(6 + kRoot15) / 21, (155 + kRoot15) / 1200}}};
 
-/// Calls f(point, weight, whether it is the piece's middle) for Radon's rule on each piece of a triangle, and
-/// with a weight of 0 for the corners and the middles of the sides, where distances are largest; weights add
-/// up to 1.
+/// Calls f(point, weight, is_middle) for Radon's rule on each piece of a triangle, where is_middle is true
+/// for the piece's middle, and with a weight of 0 for the corners and the middles of the sides, where
+/// distances are largest; weights add up to 1.
 template <class F>
 void for_each_sample(const Corners& corners, double length, const F& f) {
   const double longest = std::max(
@@ -94,8 +94,8 @@ Sums sum_over(const Described& mesh, const PlacedShape& shape, double length, co
         if (twice == 0) return;
         sums.squares += weight * area * squared;
         sums.outside += weight * area * (p - place.point).dot(place.normal);
-        // The middle of a piece stands for all of it: corners and sides on a crease that is kept belong to
-        // two faces.
+        // The middle of a piece represents all of it: corners and sides on a preserved crease belong to two
+        // faces.
         if (!is_middle) return;
         const double turned = angle(normal, place.normal);
         sums.normals += weight / kMiddle * area * turned * turned;
@@ -114,9 +114,9 @@ Sums sum_over(const Described& mesh, const PlacedShape& shape, double length, co
   return all;
 }
 
-/// Mean over the area of |H by cotangents − H of the surface|, at points all of whose triangles lie where the
-/// shape is described. A third of each triangle belongs to each of its corners. What is added up is the error
-/// times the area, which slivers, whose cotangents are large and whose area is small, leave finite.
+/// Mean over the area of |H by cotangents − H of the surface|, at vertices all of whose triangles lie where
+/// the shape is described. A third of each triangle belongs to each of its corners. The summand is the error
+/// times the area, which is finite for slivers, whose cotangents are large and whose area is small.
 std::optional<double> curvature_error(const Described& mesh, const PlacedShape& shape,
                                       const RunContext& context) {
   std::vector<Vector3d> laplacian(mesh.points.size(), Vector3d::Zero());

@@ -1,4 +1,4 @@
-// What went wrong in a benchmark, for the program's exit code.
+// The failures of a benchmark, for the program's exit code.
 #pragma once
 
 namespace hermesh {

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "algorithms/hermite/normal_code.h"
-#include "algorithms/hermite/with_normal_code.h"
+#include "algorithms/hermite/normal_codes.h"
 #include "experiments/bench/failures.h"
 
 namespace hermesh {

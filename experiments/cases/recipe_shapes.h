@@ -1,13 +1,46 @@
-// The formulas of recipes.h and what they share.
+// The formulas of recipes.h and their shared parts: random numbers, noise and shapes with the same bits on
+// every machine.
 #pragma once
 
+#include <Eigen/Core>
+#include <cstdint>
 #include <utility>
 
 #include "experiments/cases/recipes.h"
 
 namespace hermesh::recipes {
 
-/// Cosine and sine of an angle in turns, the same bits on every machine.
+/// Random numbers by splitmix64 (Steele, Lea & Flood, Fast Splittable Pseudorandom Number Generators, 2014).
+class Random {
+ public:
+  explicit Random(double seed) : state_(static_cast<std::uint64_t>(seed)) {}
+  std::uint64_t bits() {
+    std::uint64_t z = (state_ += 0x9e3779b97f4a7c15u);
+    z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9u;
+    z = (z ^ (z >> 27)) * 0x94d049bb133111ebu;
+    return z ^ (z >> 31);
+  }
+  /// Returns the next number in [0, 1).
+  double uniform() { return static_cast<double>(bits() >> 11) * 0x1p-53; }
+  double uniform(double low, double high) { return low + (high - low) * uniform(); }
+
+ private:
+  std::uint64_t state_;
+};
+
+/// Gradient noise (Perlin, Improving Noise, SIGGRAPH 2002) with a hash in place of the permutation table.
+class GradientNoise {
+ public:
+  explicit GradientNoise(std::uint64_t seed) : seed_(seed * 0x9e3779b97f4a7c15u) {}
+  /// Returns a value between about −1 and 1, and 0 if all coordinates are whole numbers.
+  double operator()(const Eigen::Vector3d& point) const;
+
+ private:
+  double gradient(const Eigen::Vector3d& lattice_point, const Eigen::Vector3d& offset) const;
+  std::uint64_t seed_;
+};
+
+/// Returns cosine and sine of an angle in turns.
 std::pair<double, double> on_circle(double turns);
 
 inline void add_point(PolygonMesh& mesh, const Eigen::Vector3d& point) {
@@ -18,34 +51,24 @@ inline std::uint32_t next_index(const PolygonMesh& mesh) {
   return static_cast<std::uint32_t>(mesh.points.size());
 }
 
-/// The triangles abc and acd.
+/// Adds the triangles abc and acd.
 void add_quad(PolygonMesh& mesh, std::uint32_t a, std::uint32_t b, std::uint32_t c, std::uint32_t d);
 
-/// Triangles over the points that are there already: point 0, then rings of `around` points each,
-/// counter-clockwise seen from where the last point is, then that last point.
+/// Adds the triangles over the points: point 0, then rings of `around` points each, counter-clockwise seen
+/// from the last point, then that point.
 void connect_rings(PolygonMesh& mesh, std::uint32_t around);
 
-/// Unit sphere of 8 n² triangles of about the same area.
+/// Returns the unit sphere with 8 n² triangles of about the same area.
 PolygonMesh octahedral_sphere(std::uint32_t n);
 
 /// Adds a sphere; one that faces inwards bounds a cavity.
 void add_sphere(PolygonMesh& mesh, const PolygonMesh& unit_sphere, double radius,
                 const Eigen::Vector3d& centre, bool inwards);
 
-/// The point turned about x, then y, then z, by the parameters about_x, about_y and about_z in degrees.
+/// Turns the point about x, then y, then z, by the parameters about_x, about_y and about_z in degrees.
 Eigen::Vector3d turned(const Eigen::Vector3d& point, const RecipeParameters& parameters);
 
-PolygonMesh noise_sphere(const RecipeParameters& parameters, RunContext& context);
-PolygonMesh nested_spheres(const RecipeParameters& parameters, RunContext& context);
-PolygonMesh overlapping_spheres(const RecipeParameters& parameters, RunContext& context);
-PolygonMesh turned_cube(const RecipeParameters& parameters, RunContext& context);
 PolygonMesh torus(const RecipeParameters& parameters, RunContext& context);
-PolygonMesh uv_sphere(const RecipeParameters& parameters, RunContext& context);
-PolygonMesh cylinder(const RecipeParameters& parameters, RunContext& context);
-PolygonMesh cad_part(const RecipeParameters& parameters, RunContext& context);
-PolygonMesh sphere_cluster(const RecipeParameters& parameters, RunContext& context);
-PolygonMesh holed_sphere(const RecipeParameters& parameters, RunContext& context);
-PolygonMesh sheets(const RecipeParameters& parameters, RunContext& context);
 PolygonMesh splash(const RecipeParameters& parameters, RunContext& context);
 
 }  // namespace hermesh::recipes

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "experiments/cases/recipe_random.h"
 #include "experiments/cases/recipe_shapes.h"
 
 namespace hermesh::recipes {
@@ -28,7 +27,7 @@ struct Crown {
     const auto [c, s] = on_circle(turns);
     return 0.75 + 0.45 * noise({2.5 * c, 2.5 * s, 0.5});
   }
-  /// A place on the sheet's middle: `up` from 0 below the water to 1 at the rim.
+  /// A point on the middle surface of the sheet: `up` from 0 below the water to 1 at the rim.
   Vector3d middle(double turns, double up, double aside) const {
     const auto [c, s] = on_circle(turns);
     const double reach =
@@ -112,7 +111,7 @@ PolygonMesh pool_of_waves(const GradientNoise& noise, double detail) {
   return mesh;
 }
 
-/// The path of what flies off a rim.
+/// The path of a drop or ligament that flies off a rim.
 struct Flight {
   Vector3d start, velocity;
   Vector3d at(double time) const {
@@ -186,7 +185,7 @@ PolygonMesh splash(const RecipeParameters& parameters, RunContext& context) {
   const auto wanted = [&](double part) { return only == 0 || only == part; };
   PolygonMesh mesh = wanted(1) ? pool_of_waves(waves, detail) : PolygonMesh();
   std::vector<Crown> crowns;
-  constexpr int kMostTries = 1000;  // where no place is left there are fewer crowns
+  constexpr int kMostTries = 1000;  // fewer crowns are made if no space is left
   for (int tries = 0; crowns.size() < parameters.at("crowns") && tries < kMostTries; ++tries) {
     const double radius = random.uniform(0.025, 0.07), reach = 1.5 * radius;
     const Crown crown{random.uniform(reach - kHalf.x(), kHalf.x() - reach),
@@ -204,7 +203,7 @@ PolygonMesh splash(const RecipeParameters& parameters, RunContext& context) {
     crowns.push_back(crown);
     if (wanted(2)) append(mesh, sheet_of(crowns.back(), detail));
   }
-  // Without crowns what flies starts from the middle of the pool.
+  // Without crowns, drops and ligaments start from the middle of the pool.
   const std::vector<Crown> sources =
       crowns.empty() ? std::vector<Crown>{{0, 0, 0.05, 0.05, 0.2, 0.003, GradientNoise(1)}} : crowns;
   const auto source = [&]() -> const Crown& { return sources[random.bits() % sources.size()]; };

@@ -1,5 +1,3 @@
-#include "experiments/cases/sha256.h"
-
 #include <openssl/evp.h>
 
 #include <bit>
@@ -8,7 +6,7 @@
 #include <stdexcept>
 #include <vector>
 
-#include "algorithms/core/error.h"
+#include "experiments/cases/cases.h"
 
 namespace hermesh {
 

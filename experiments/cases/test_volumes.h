@@ -15,13 +15,13 @@ namespace hermesh {
 LevelSet make_volume(const std::array<int, 3>& size, float background,
                      const std::function<float(int, int, int)>& value);
 
-/// Many small sign patterns in one volume, each with outside all around it: the lowest bits of pattern(i) say
-/// which of its size³ samples are inside; the values are random.
+/// Many small sign patterns in one volume, each with outside all around it: the lowest bits of pattern(i)
+/// specify which of its size³ samples are inside; the values are random.
 LevelSet make_patterns(int per_axis, int size, const std::function<std::uint32_t(int)>& pattern,
                        std::mt19937 random);
 
 /// A narrow-band level set of a sphere about a point, band of three voxels, inside filled with tiles.
-/// `translation` places index zero in the world.
+/// `translation` is the world position of index zero.
 LevelSet make_sphere(double radius_in_voxels, double voxel_size,
                      const std::array<double, 3>& translation = {0, 0, 0});
 

@@ -1,20 +1,16 @@
-#include "experiments/cases/volume_cases.h"
-
+// Stand-ins for volumes whose files are missing.
 #include <algorithm>
 #include <cmath>
 
 #include "algorithms/core/level_set_grid.h"
-#include "algorithms/io/import/import_volume.h"
-#include "algorithms/io/vdb_file.h"
-#include "experiments/cases/case_file.h"
-#include "experiments/cases/cases.h"
+#include "experiments/cases/recipes.h"
 
 namespace hermesh {
 namespace {
 
 using openvdb::Coord;
 
-/// A number from 0 to 1 for each lattice point (a finalizer of MurmurHash3).
+/// Returns a number from 0 to 1 for each lattice point (a finalizer of MurmurHash3).
 double lattice_noise(int x, int y, int z) {
   std::uint32_t h =
       std::uint32_t(x) * 0x9e3779b1u ^ std::uint32_t(y) * 0x85ebca77u ^ std::uint32_t(z) * 0xc2b2ae3du;
@@ -23,20 +19,20 @@ double lattice_noise(int x, int y, int z) {
   return double((h ^ (h >> 16)) >> 8) / 0x1p24;
 }
 
-/// Noise from 0 to 1, trilinear between lattice points `spacing` samples apart.
+/// Returns noise from 0 to 1, trilinear between lattice points `spacing` samples apart.
 double noise(const Coord& at, int spacing) {
   const double scaled[3] = {double(at.x()) / spacing, double(at.y()) / spacing, double(at.z()) / spacing};
   const int low[3] = {int(std::floor(scaled[0])), int(std::floor(scaled[1])), int(std::floor(scaled[2]))};
   double sum = 0.0;
   for (int corner = 0; corner < 8; ++corner) {
     double weight = 1.0;
-    int place[3];
+    int at_corner[3];
     for (int axis = 0; axis < 3; ++axis) {
       const int up = (corner >> axis) & 1;
-      place[axis] = low[axis] + up;
+      at_corner[axis] = low[axis] + up;
       weight *= up ? scaled[axis] - low[axis] : 1.0 - (scaled[axis] - low[axis]);
     }
-    sum += weight * lattice_noise(place[0], place[1], place[2]);
+    sum += weight * lattice_noise(at_corner[0], at_corner[1], at_corner[2]);
   }
   return sum;
 }
@@ -88,48 +84,11 @@ LevelSet make_cube() {
   return make_level_set(grid);
 }
 
-LevelSet read_volume(const CaseRecipe& recipe, const std::filesystem::path& path, RunContext& context) {
-  if (recipe.raw)
-    return import_raw(path,
-                      {.dims = recipe.raw->dims,
-                       .format = parse_sample_format(recipe.raw->type),
-                       .spacing = recipe.raw->spacing,
-                       .offset = 0},
-                      {}, context);
-  if (is_nifti_path(path)) return import_nifti(path, {}, context);
-  return read_level_set(path, "", context);
-}
-
 }  // namespace
-
-bool is_volume_stand_in(const std::string& name) { return name == "scan" || name == "fog" || name == "cube"; }
 
 LevelSet make_volume_stand_in(const std::string& name) {
   initialize_openvdb();
-  if (name == "scan") return make_scan();
-  if (name == "fog") return make_fog();
-  if (name == "cube") return make_cube();
-  throw Error("there is no stand-in for a volume '" + name + "'; there are scan, fog and cube");
-}
-
-LoadedVolume load_volume(const std::string& name, RunContext& context) {
-  const std::vector<CaseRecipe> all = read_case_file(experiments_folder() / "cases.toml");
-  const auto recipe = std::ranges::find(all, name, &CaseRecipe::name);
-  if (recipe == all.end()) throw Error("there is no case '" + name + "'");
-  if (!recipe->is_volume) throw Error("the case " + name + " is no volume");
-  std::string reasons;
-  if (const auto located = locate_files(*recipe, reasons, context))
-    return {name, read_volume(*recipe, located->path, context), located->origin, located->sha256};
-  check_stand_in_allowed(name, reasons);
-  return {name, make_volume_stand_in(recipe->stand_in),
-          "stand-in: " + recipe->stand_in + ", because " + reasons, ""};
-}
-
-std::vector<std::string> volume_choices() {
-  std::vector<std::string> names;
-  for (const CaseInfo& info : list_cases())
-    if (info.kind == "volume") names.push_back(info.name);
-  return names;
+  return name == "scan" ? make_scan() : name == "fog" ? make_fog() : make_cube();
 }
 
 }  // namespace hermesh

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "algorithms/thesis/voxels/dense_hermite.h"
 #include "experiments/cells/serve.h"
 #include "experiments/pictures/exploded.h"
 #include "experiments/provenance.h"
@@ -34,6 +35,7 @@ int run(const std::vector<std::string>& words) {
 
 int main(int argc, char** argv) {
   try {
+    hermesh::register_dense_grids();
     return run({argv + 1, argv + argc});
   } catch (const std::exception& error) {
     std::cerr << "hermesh-lab: " << error.what() << '\n';

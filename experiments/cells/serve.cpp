@@ -1,16 +1,20 @@
 #include "experiments/cells/serve.h"
 
+#include <tbb/blocked_range.h>
 #include <tbb/global_control.h>
+#include <tbb/parallel_for.h>
 #include <unistd.h>
 
 #include <cerrno>
 #include <chrono>
+#include <cmath>
 #include <iostream>
 
+#include "algorithms/io/mesh_file.h"
 #include "experiments/harness/cell.h"
-#include "experiments/harness/mesh_distances.h"
 #include "experiments/measurements/measurements.h"
 #include "experiments/variants.h"
+#include "validation/geometry/triangle_tree.h"
 
 namespace hermesh {
 namespace {
@@ -25,6 +29,31 @@ void send(const Json& answer) {
     if (written <= 0) return;  // the laboratory has ended
     done += static_cast<std::size_t>(written);
   }
+}
+
+/// Returns the distances of the vertices of each mesh file to the polygons of the input, world units.
+std::vector<std::vector<double>> mesh_distances(const LoadedCase& input,
+                                                const std::vector<std::filesystem::path>& meshes,
+                                                RunContext& context) {
+  // Quads of an input are split like in validation.
+  const validation::TriangleTree tree(
+      validation::TriangleSoup(to_mesh_file(input.mesh), validation::QuadRule::better));
+  std::vector<std::vector<double>> all;
+  for (const std::filesystem::path& file : meshes) {
+    const MeshFile mesh = read_mesh_file(file, context);
+    std::vector<double> distances(mesh.points.size());
+    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, distances.size(), 512), [&](const auto& range) {
+      context.check();
+      std::uint32_t guess = 0;
+      for (std::size_t i = range.begin(); i < range.end(); ++i) {
+        const validation::ClosestHit hit = tree.closest(mesh.points[i], guess);
+        guess = hit.slot;
+        distances[i] = std::sqrt(hit.squared);
+      }
+    });
+    all.push_back(std::move(distances));
+  }
+  return all;
 }
 
 void work_on(const Json& job, const Tables& tables, RunContext& context) {
@@ -78,11 +107,8 @@ Json to_json(const Measurement& measurement) {
 }  // namespace
 
 Tables all_tables() {
-  Tables tables{all_extractors(), all_voxelizers(), {}, load_case, load_changed_case};
-  for (const CaseInfo& info : list_cases())
-    if (info.kind != "volume") tables.cases.push_back(info.name);
-  tables.measurements = {all_measurements().begin(), all_measurements().end()};
-  return tables;
+  return {all_extractors(), all_voxelizers(),  case_choices(),
+          load_case,        load_changed_case, {all_measurements().begin(), all_measurements().end()}};
 }
 
 void serve_job(const Tables& tables, RunContext& context) {

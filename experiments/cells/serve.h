@@ -1,4 +1,4 @@
-// Jobs: what the laboratory (experiments/lab/driver.py) asks hermesh-lab for, as lines of JSON on the
+// Jobs: the requests of the laboratory (experiments/lab/driver.py) to hermesh-lab, as lines of JSON on the
 // standard input, and the answers, lines of JSON on file descriptor 3.
 //
 // A job is an object with "kind", "threads", "require_data" and "out", and depending on its kind

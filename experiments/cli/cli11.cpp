@@ -1,2 +1,2 @@
-// All of CLI11, so that what cli11.h leaves out is compiled somewhere.
+// All of CLI11, to compile the parts that cli11.h leaves out.
 #include <CLI/CLI.hpp>

@@ -1,30 +1,26 @@
-// What the program does to the files and streams around it: nothing is overwritten, followed or waited for
-// that the user did not ask for.
+// Files and streams around the program: it overwrites, follows and waits for nothing without a request.
 #include <fcntl.h>
 #include <pty.h>
 #include <unistd.h>
 
 #include <filesystem>
-#include <nlohmann/json.hpp>
 #include <thread>
 
 #include "experiments/cli/process_for_tests.h"
 #include "experiments/cli/terminal_progress.h"
 
 namespace hermesh::cli {
-namespace {
+namespace cli_surroundings_test {
 
 using Json = nlohmann::json;
-using Arguments = std::vector<std::string>;
 
 class SurroundingsTest : public ProgramTest {
  protected:
   /// Expects that the command is wrong usage and changes no file.
-  void expect_usage_error(const Arguments& arguments) {
+  void expect_usage_error(const Words& arguments) {
     const std::set<std::string> before = files();
     const std::string sphere = read("sphere.off"), cube = read("cube.off");
-    const Outcome outcome = run(arguments);
-    EXPECT_EQ(outcome.exit_code, 2) << outcome.out << outcome.err;
+    run_to(2, arguments);
     EXPECT_EQ(files(), before);
     EXPECT_TRUE(read("sphere.off") == sphere && read("cube.off") == cube);
   }
@@ -41,7 +37,7 @@ TEST_F(SurroundingsTest, ClosedStreamsAreErrors) {
   }
   // Files of the command do not get the number of a stream, so that messages do not go into them.
   EXPECT_EQ(run_shell("$H remesh sphere.off out.off --resolution 8 <&- >&- 2>&-").exit_code, 1);
-  EXPECT_EQ(run({"remesh", "sphere.off", "same.off", "--resolution", "8"}).exit_code, 0);
+  run_to(0, "remesh sphere.off same.off --resolution 8");
   EXPECT_EQ(read("out.off"), read("same.off"));
   EXPECT_EQ(files(), (std::set<std::string>{"out.off", "same.off", "sphere.off"}));
 }
@@ -51,46 +47,36 @@ TEST_F(SurroundingsTest, LogAndReportAreNoFilesOfTheCommand) {
   write_cube();
   std::filesystem::create_hard_link(path("sphere.off"), path("hard.off"));
   std::filesystem::create_symlink("sphere.off", path("soft.off"));
-  const Arguments remesh = {"remesh", "sphere.off", "out.off", "--resolution", "8"};
-  const auto with = [](Arguments arguments, const Arguments& more) {
-    arguments.insert(arguments.end(), more.begin(), more.end());
-    return arguments;
-  };
+  const Words remesh = "remesh sphere.off out.off --resolution 8";
   for (const char* file : {"sphere.off", "./sphere.off", "hard.off", "soft.off", "out.off"}) {
     SCOPED_TRACE(file);
-    expect_usage_error(with(remesh, {"--log", file}));
-    expect_usage_error(with(remesh, {"--json=" + std::string(file)}));
+    expect_usage_error(remesh + Words{"--log", file});
+    expect_usage_error(remesh + Words{"--json=" + std::string(file)});
   }
-  expect_usage_error(with(remesh, {"--log", "x.json", "--json=x.json"}));
-  expect_usage_error({"--log", "cube.off", "validate", "sphere.off", "--reference", "cube.off"});
-  expect_usage_error({"validate", "sphere.off", "cube.off", "--log", "cube.off"});
-  expect_usage_error({"fracture", "sphere.off", "pieces", "--resolution", "8", "--cutters", "mesh:cube.off",
-                      "--log", "cube.off"});
-  expect_usage_error({"run", "sphere.off", "--log", "sphere.off"});
+  expect_usage_error(remesh + "--log x.json --json=x.json");
+  expect_usage_error("--log cube.off validate sphere.off --reference cube.off");
+  expect_usage_error("validate sphere.off cube.off --log cube.off");
+  expect_usage_error("fracture sphere.off pieces --resolution 8 --cutters mesh:cube.off --log cube.off");
+  expect_usage_error("run sphere.off --log sphere.off");
   // A log of earlier runs is continued.
-  for (int i = 0; i < 2; ++i)
-    EXPECT_EQ(run(with(remesh, {"--log", "log.txt", "--json", "x.json"})).exit_code, 0);
+  for (int i = 0; i < 2; ++i) run_to(0, remesh + "--log log.txt --json x.json");
 }
 
 TEST_F(SurroundingsTest, InputsAreOverwrittenOnRequestOnly) {
   write_sphere();
   write_cube();
   std::filesystem::create_symlink("sphere.off", path("soft.off"));
-  expect_usage_error({"remesh", "sphere.off", "sphere.off", "--resolution", "8"});
-  expect_usage_error({"remesh", "soft.off", "sphere.off", "--resolution", "8"});
-  expect_usage_error({"remesh", "sphere.off", "./soft.off", "--triangles", "100"});
+  expect_usage_error("remesh sphere.off sphere.off --resolution 8");
+  expect_usage_error("remesh soft.off sphere.off --resolution 8");
+  expect_usage_error("remesh sphere.off ./soft.off --triangles 100");
   for (const char* out : {"sphere.off", "cube.off"})
     expect_usage_error({"combine", "union", "sphere.off", "cube.off", out, "--resolution", "8"});
-  expect_usage_error({"remesh", "sphere.off", "--out-dir", ".", "--pattern", "{name}", "--resolution", "8"});
-  expect_usage_error({"remesh", "sphere.off", "--out-dir", "out", "--resolution", "8", "--overwrite-input"});
-  ASSERT_EQ(run({"remesh", "sphere.off", "out.off", "--resolution", "8"}).exit_code, 0);
-  EXPECT_EQ(run({"remesh", "sphere.off", "sphere.off", "--resolution", "8", "--overwrite-input"}).exit_code,
-            0);
+  expect_usage_error("remesh sphere.off --out-dir . --pattern {name} --resolution 8");
+  expect_usage_error("remesh sphere.off --out-dir out --resolution 8 --overwrite-input");
+  run_to(0, "remesh sphere.off out.off --resolution 8");
+  run_to(0, "remesh sphere.off sphere.off --resolution 8 --overwrite-input");
   EXPECT_EQ(read("sphere.off"), read("out.off"));
-  EXPECT_EQ(run({"combine", "union", "sphere.off", "cube.off", "cube.off", "--resolution", "8",
-                 "--overwrite-input"})
-                .exit_code,
-            0);
+  run_to(0, "combine union sphere.off cube.off cube.off --resolution 8 --overwrite-input");
 }
 
 TEST_F(SurroundingsTest, JsonIsValidWhateverBytesAFileNameHas) {
@@ -99,8 +85,8 @@ TEST_F(SurroundingsTest, JsonIsValidWhateverBytesAFileNameHas) {
       "K\xe4"
       "fer\xff.off";
   std::filesystem::rename(path("cube.off"), path(name));
-  for (const Arguments& arguments :
-       {Arguments{"fracture", name, "out", "--resolution", "8", "--cutters", "mesh:" + name, "--no-picture"},
+  for (const Words& arguments :
+       {Words{"fracture", name, "out", "--resolution", "8", "--cutters", "mesh:" + name, "--no-picture"},
         {"fracture", name, "two", "--resolution", "8", "--cutters", "voronoi:2", "--no-picture", "--judge"},
         {"remesh", name, "out.ply", "--resolution", "8"},
         {"voxelize", name, "out.vdb", "--resolution", "8"},
@@ -108,9 +94,7 @@ TEST_F(SurroundingsTest, JsonIsValidWhateverBytesAFileNameHas) {
         {"info", name},
         {"validate", name, "--reference", name},
         {"validate", "K\xe4"}}) {
-    Arguments with_json = arguments;
-    with_json.push_back("--json");
-    const Outcome outcome = run(with_json);
+    const Outcome outcome = run(arguments + "--json");
     EXPECT_TRUE(outcome.exit_code == 0 || arguments[1] == "K\xe4") << arguments[0] << outcome.err;
     EXPECT_TRUE(Json::accept(outcome.out)) << arguments[0] << outcome.out << outcome.err;
   }
@@ -132,57 +116,46 @@ TEST_F(SurroundingsTest, AnObjectSmallerThanAVoxelIsRefusedWhereverItLies) {
   for (const double shift : {-1.0, 0.0, 17.0, 90.0, 198.0}) {
     SCOPED_TRACE(shift);
     write("box.off", small_box(shift));
-    for (const Arguments& arguments :
-         {Arguments{"remesh", "box.off", "out.ply", "--units", "mm", "--voxel-size", "0.2"},
-          {"voxelize", "box.off", "out.vdb", "--units", "mm", "--voxel-size", "0.2"},
-          {"fracture", "box.off", "out", "--cutters", "voronoi:2", "--units", "mm", "--voxel-size", "0.2"},
-          {"combine", "union", "box.off", "box.off", "out.ply", "--units", "mm", "--voxel-size", "0.2"}}) {
-      const Outcome outcome = run(arguments);
-      EXPECT_EQ(outcome.exit_code, 1) << outcome.out << outcome.err;
-      EXPECT_NE(outcome.err.find("box.off"), std::string::npos) << outcome.err;
-    }
-    EXPECT_EQ(files(), std::set<std::string>{"box.off"});
+    for (const Words arguments :
+         {"remesh box.off out.ply", "voxelize box.off out.vdb", "fracture box.off out --cutters voronoi:2",
+          "combine union box.off box.off out.ply"})
+      expect_refusal(1, arguments + "--units mm --voxel-size 0.2", {"box.off"}, true);
   }
-  EXPECT_EQ(run({"remesh", "box.off", "out.ply", "--units", "mm", "--voxel-size", "0.0002"}).exit_code, 0);
+  run_to(0, "remesh box.off out.ply --units mm --voxel-size 0.0002");
 }
 
 TEST_F(SurroundingsTest, UnitsAreStatedWhereTheFormatHasThem) {
   write("box.off", small_box(0.0));
-  for (const Arguments& command :
-       {Arguments{"remesh", "box.off"}, {"combine", "union", "box.off", "box.off"}}) {
-    Arguments arguments = command;
-    arguments.insert(arguments.end(), {"out.3mf", "--resolution", "20", "--units", "mm"});
-    ASSERT_EQ(run(arguments).exit_code, 0);
-    const Outcome outcome = run({"validate", "out.3mf", "--json"});
-    ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
-    const Json report = Json::parse(outcome.out);
+  for (const Words command : {"remesh box.off", "combine union box.off box.off"}) {
+    run_to(0, command + "out.3mf --resolution 20 --units mm");
+    const Json report = json_of("validate out.3mf --json");
     // The reader takes the numbers as they are, and notes a unit other than the millimetre.
     EXPECT_NEAR(report.at("volume").get<double>(), 24e-9, 1e-11);
-    EXPECT_NE(report.at("notes").dump().find("'meter'"), std::string::npos) << report.at("notes");
+    EXPECT_PRED2(has, report.at("notes").dump(), "'meter'") << report.at("notes");
   }
-  ASSERT_EQ(run({"remesh", "box.off", "out.3mf", "--resolution", "20"}).exit_code, 0);
-  const Json report = Json::parse(run({"validate", "out.3mf", "--json"}).out);
+  run_to(0, "remesh box.off out.3mf --resolution 20");
+  const Json report = json_of("validate out.3mf --json");
   EXPECT_NEAR(report.at("volume").get<double>(), 24.0, 0.01);
   EXPECT_TRUE(report.at("notes").empty()) << report.at("notes");
 }
 
 TEST_F(SurroundingsTest, WholeNumbersHaveAnyNotation) {
   write_cube();
-  ASSERT_EQ(run({"remesh", "cube.off", "digits.off", "--resolution", "20"}).exit_code, 0);
+  run_to(0, "remesh cube.off digits.off --resolution 20");
   for (const char* number : {"2e1", "20.0", "0.2E2", "+20"}) {
-    EXPECT_EQ(run({"remesh", "cube.off", "out.off", "--resolution", number}).exit_code, 0) << number;
+    run_to(0, {"remesh", "cube.off", "out.off", "--resolution", number});
     EXPECT_EQ(read("out.off"), read("digits.off")) << number;
   }
   for (const char* number : {"2.05e1", "2e-1", "1e300", "inf", "2e1x"})
-    EXPECT_EQ(run({"remesh", "cube.off", "x.off", "--resolution", number}).exit_code, 2) << number;
-  EXPECT_EQ(run({"remesh", "cube.off", "x.off", "--triangles", "1e2"}).exit_code, 0);
+    run_to(2, {"remesh", "cube.off", "x.off", "--resolution", number});
+  run_to(0, "remesh cube.off x.off --triangles 1e2");
 }
 
 TEST_F(SurroundingsTest, MorePlacesThanSamplesAreRefused) {
   write_cube();
   for (const char* cutters : {"voronoi:1000000", "chunks:1000000", "mesh:cube.off*1000000"}) {
-    const Outcome outcome = run({"fracture", "cube.off", "out", "--resolution", "20", "--cutters", cutters});
-    EXPECT_EQ(outcome.exit_code, 1) << outcome.err;
+    const Outcome outcome =
+        run_to(1, {"fracture", "cube.off", "out", "--resolution", "20", "--cutters", cutters});
     EXPECT_LT(outcome.seconds, 5.0);
   }
   EXPECT_EQ(files(), std::set<std::string>{"cube.off"});
@@ -213,5 +186,5 @@ TEST(TerminalProgressTest, IsNeverSilent) {
   EXPECT_GE(lines, 2) << sent;
 }
 
-}  // namespace
+}  // namespace cli_surroundings_test
 }  // namespace hermesh::cli

@@ -1,49 +1,43 @@
-// The program from the outside: what its commands do, print and return.
+// The commands of the program: results, output and exit codes.
 #include <signal.h>
 
 #include <algorithm>
 #include <array>
-#include <nlohmann/json.hpp>
 #include <sstream>
 
 #include "experiments/cli/process_for_tests.h"
 
 namespace hermesh::cli {
-namespace {
+namespace cli_test {
 
 using Json = nlohmann::json;
 using CliTest = ProgramTest;
 
 /// The names in a list of objects that have one.
-std::vector<std::string> names(const Json& list) {
-  std::vector<std::string> all;
+Words names(const Json& list) {
+  Words all;
   for (const Json& item : list) all.push_back(item.at("name"));
   return all;
 }
 
-bool contains(const std::vector<std::string>& all, const std::string& name) {
+bool contains(const Words& all, const std::string& name) {
   return std::find(all.begin(), all.end(), name) != all.end();
 }
 
 TEST_F(CliTest, EveryCommandHasHelp) {
-  const Outcome overview = run({"--help"});
-  EXPECT_EQ(overview.exit_code, 0);
+  const Outcome overview = run_to(0, {"--help"});
   for (const char* command : {"list", "voxelize", "import", "extract", "remesh", "combine", "validate",
                               "info", "run", "report", "compare", "accept"}) {
     SCOPED_TRACE(command);
-    EXPECT_NE(overview.out.find(command), std::string::npos);
-    const Outcome help = run({command, "--help"});
-    EXPECT_EQ(help.exit_code, 0);
+    EXPECT_PRED2(has, overview.out, command);
+    const Outcome help = run_to(0, {command, "--help"});
     EXPECT_EQ(help.err, "");
-    for (const char* option : {"--threads", "--quiet", "--help"})
-      EXPECT_NE(help.out.find(option), std::string::npos) << help.out;
+    for (const char* option : {"--threads", "--quiet", "--help"}) EXPECT_PRED2(has, help.out, option);
   }
 }
 
 TEST_F(CliTest, ListIsJsonWithEveryVariant) {
-  const Outcome outcome = run({"list", "--json"});
-  ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
-  const Json list = Json::parse(outcome.out);
+  const Json list = json_of("list --json");
   for (const char* name :
        {"marching-cubes", "dual-contouring", "openvdb", "cgal-surface-mesher", "marching-cubes-decimated"})
     EXPECT_TRUE(contains(names(list["extractors"]), name)) << name;
@@ -59,28 +53,22 @@ TEST_F(CliTest, ListIsJsonWithEveryVariant) {
 }
 
 TEST_F(CliTest, ListForPeopleNamesTheSame) {
-  const Outcome text = run({"list"});
-  ASSERT_EQ(text.exit_code, 0) << text.err;
-  const Json list = Json::parse(run({"list", "--json"}).out);
+  const Outcome text = run_to(0, {"list"});
+  const Json list = json_of("list --json");
   for (const char* kind : {"extractors", "voxelizers", "experiments", "cases"})
-    for (const std::string& name : names(list[kind]))
-      EXPECT_NE(text.out.find(name), std::string::npos) << name;
+    for (const std::string& name : names(list[kind])) EXPECT_PRED2(has, text.out, name) << name;
 }
 
 TEST_F(CliTest, CubeThroughAllStages) {
   write_cube();
   // A resolution of 10 would put samples onto the cube's faces.
-  const Outcome outcome =
-      run({"remesh", "cube.off", "out.ply", "--resolution", "11", "--extractor", "marching-cubes"});
-  ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
+  const Outcome outcome = run_to(0, "remesh cube.off out.ply --resolution 11 --extractor marching-cubes");
   EXPECT_EQ(outcome.err, "");
-  EXPECT_NE(outcome.out.find("marching-cubes"), std::string::npos);
+  EXPECT_PRED2(has, outcome.out, "marching-cubes");
 
-  const Outcome judged = run(
-      {"validate", "out.ply", "--reference", "cube.off", "--features", "cube.off", "--certify", "--require",
-       "closed,manifold,oriented,watertight,no-self-intersection", "--json", "--samples", "20000"});
-  ASSERT_EQ(judged.exit_code, 0) << judged.err << judged.out;
-  const Json report = Json::parse(judged.out);
+  const Json report = json_of(
+      "validate out.ply --reference cube.off --features cube.off --certify --require "
+      "closed,manifold,oriented,watertight,no-self-intersection --json --samples 20000");
   for (const char* key :
        {"boundary_edges", "non_manifold_edges", "non_manifold_vertices", "inconsistent_edges",
         "degenerate_polygons", "duplicate_polygons", "isolated_points", "genus", "self_intersecting_pairs"})
@@ -105,84 +93,74 @@ TEST_F(CliTest, CubeThroughAllStages) {
 
 TEST_F(CliTest, VoxelizeAndExtractGiveWhatRemeshGives) {
   write_sphere();
-  ASSERT_EQ(run({"voxelize", "sphere.off", "sphere.vdb", "--voxel-size", "0.1"}).exit_code, 0);
-  ASSERT_EQ(run({"extract", "sphere.vdb", "two.ply", "--extractor", "marching-cubes"}).exit_code, 0);
-  ASSERT_EQ(run({"extract", "sphere.vdb", "exact.ply", "--source", "sphere.off"}).exit_code, 0);
-  ASSERT_EQ(run({"remesh", "sphere.off", "one.ply", "--resolution", "20", "--extractor", "marching-cubes"})
-                .exit_code,
-            0);
-  ASSERT_EQ(
-      run({"remesh", "sphere.off", "remeshed.ply", "--resolution", "20", "--extractor", "dual-contouring"})
-          .exit_code,
-      0);
+  run_to(0, "voxelize sphere.off sphere.vdb --voxel-size 0.1");
+  run_to(0, "extract sphere.vdb two.ply --extractor marching-cubes");
+  run_to(0, "extract sphere.vdb exact.ply --source sphere.off");
+  run_to(0, "remesh sphere.off one.ply --resolution 20 --extractor marching-cubes");
+  run_to(0, "remesh sphere.off remeshed.ply --resolution 20 --extractor dual-contouring");
   EXPECT_EQ(read("one.ply"), read("two.ply"));
   EXPECT_EQ(read("exact.ply"), read("remeshed.ply"));
 
-  const Outcome info = run({"info", "sphere.vdb"});
-  EXPECT_EQ(info.exit_code, 0) << info.err;
-  EXPECT_NE(info.out.find("sdf"), std::string::npos) << info.out;
-  EXPECT_NE(info.out.find("level set"), std::string::npos) << info.out;
+  const Outcome info = run_to(0, "info sphere.vdb");
+  EXPECT_PRED2(has, info.out, "sdf");
+  EXPECT_PRED2(has, info.out, "level set");
 }
 
 TEST_F(CliTest, BandsAndIsovalueTakeEffect) {
   write_sphere();
-  const Outcome narrow = run({"voxelize", "sphere.off", "narrow.vdb", "--voxel-size", "0.1"});
-  const Outcome wide = run({"voxelize", "sphere.off", "wide.vdb", "--voxel-size", "0.1", "--interior-band",
-                            "6", "--exterior-band", "6"});
+  const Outcome narrow = run("voxelize sphere.off narrow.vdb --voxel-size 0.1");
+  const Outcome wide =
+      run("voxelize sphere.off wide.vdb --voxel-size 0.1 --interior-band 6 --exterior-band 6");
   ASSERT_EQ(narrow.exit_code, 0) << narrow.err;
   ASSERT_EQ(wide.exit_code, 0) << wide.err;
-  EXPECT_NE(run({"info", "narrow.vdb"}).out, run({"info", "wide.vdb"}).out);
+  EXPECT_NE(run("info narrow.vdb").out, run("info wide.vdb").out);
   // Moving the isovalue outwards by 0.2 makes the sphere's radius 1.2 and its volume 1.2³ times as large.
   const auto volume = [&](const std::string& isovalue) {
-    EXPECT_EQ(run({"extract", "wide.vdb", "out.ply", "--isovalue", isovalue}).exit_code, 0);
-    return Json::parse(run({"validate", "out.ply", "--json"}).out).at("volume").get<double>();
+    run_to(0, {"extract", "wide.vdb", "out.ply", "--isovalue", isovalue});
+    return json_of("validate out.ply --json").at("volume").get<double>();
   };
   EXPECT_NEAR(volume("0.2") / volume("0"), 1.728, 0.02);
   EXPECT_NEAR(volume("-0.2") / volume("0"), 0.512, 0.02);
 }
 
-/// Exact crossings are no use at other isovalues: the polygons, which remesh has at hand, lie at 0.
+/// Exact crossings cannot be used at other isovalues: the polygons that remesh has available are at 0.
 TEST_F(CliTest, RemeshesAtOtherIsovalues) {
   write_sphere();
   const auto volume = [&](const std::string& isovalue) {
-    EXPECT_EQ(
-        run({"remesh", "sphere.off", "out.ply", "--voxel-size", "0.1", "--isovalue", isovalue}).exit_code, 0);
-    return Json::parse(run({"validate", "out.ply", "--json"}).out).at("volume").get<double>();
+    run_to(0, {"remesh", "sphere.off", "out.ply", "--voxel-size", "0.1", "--isovalue", isovalue});
+    return json_of("validate out.ply --json").at("volume").get<double>();
   };
   EXPECT_NEAR(volume("0.05") / volume("0"), 1.158, 0.005);
   for (const auto& [extractor, option] :
        {std::pair("dual-contouring", "hermite=exact"), std::pair("marching-cubes", "crossings=exact")}) {
-    const Outcome refused = run({"remesh", "sphere.off", "x.ply", "--voxel-size", "0.1", "--isovalue", "0.05",
-                                 "--extractor", extractor, "-o", option});
-    EXPECT_EQ(refused.exit_code, 1) << extractor;
-    EXPECT_NE(refused.err.find("isovalue 0"), std::string::npos) << refused.err;
+    const Outcome refused = run_to(1, {"remesh", "sphere.off", "x.ply", "--voxel-size", "0.1", "--isovalue",
+                                       "0.05", "--extractor", extractor, "-o", option});
+    EXPECT_PRED2(has, refused.err, "isovalue");
   }
 }
 
 TEST_F(CliTest, EveryExtractorRuns) {
   write_sphere();
-  const Json list = Json::parse(run({"list", "--json"}).out);
+  const Json list = json_of("list --json");
   for (const std::string& name : names(list["extractors"])) {
     const Outcome outcome =
         run({"remesh", "sphere.off", name + ".obj", "--resolution", "16", "--extractor", name, "--quiet"});
     EXPECT_EQ(outcome.exit_code, 0) << name << ": " << outcome.err;
     EXPECT_EQ(outcome.out + outcome.err, "") << name;
-    EXPECT_EQ(run({"validate", name + ".obj", "--require", "closed"}).exit_code, 0) << name;
+    run_to(0, {"validate", name + ".obj", "--require", "closed"});
   }
 }
 
 TEST_F(CliTest, SameBytesForEveryNumberOfThreads) {
   write_sphere();
-  const Json list = Json::parse(run({"list", "--json"}).out);
+  const Json list = json_of("list --json");
   int compared = 0;
   for (const Json& extractor : list["extractors"]) {
     if (!extractor.at("ours")) continue;
     const std::string name = extractor.at("name");
     for (const char* threads : {"1", "2"})
-      ASSERT_EQ(run({"remesh", "sphere.off", name + threads + ".ply", "--resolution", "64", "--extractor",
-                     name, "--threads", threads})
-                    .exit_code,
-                0);
+      run_to(0, {"remesh", "sphere.off", name + threads + ".ply", "--resolution", "64", "--extractor", name,
+                 "--threads", threads});
     EXPECT_TRUE(read(name + "1.ply") == read(name + "2.ply")) << name;
     ++compared;
   }
@@ -191,16 +169,13 @@ TEST_F(CliTest, SameBytesForEveryNumberOfThreads) {
 
 TEST_F(CliTest, RequirementNotMetIsExitCodeThree) {
   write("triangle.off", "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n");
-  const Outcome outcome = run({"validate", "triangle.off", "--require", "manifold,closed", "--json"});
-  EXPECT_EQ(outcome.exit_code, 3) << outcome.err;
-  const Json report = Json::parse(outcome.out);
+  const Json report = json_of("validate triangle.off --require manifold,closed --json", 3);
   EXPECT_EQ(report.at("boundary_edges"), 3);
   EXPECT_TRUE(report.at("genus").is_null());
   EXPECT_EQ(report.at("unmet_requirements"), Json::array({"closed"}));
-  EXPECT_EQ(
-      run({"validate", "triangle.off", "--require", "manifold,oriented,no-self-intersection"}).exit_code, 0);
-  EXPECT_EQ(run({"validate", "triangle.off", "--require", "watertight"}).exit_code, 3);
-  EXPECT_EQ(run({"validate", "triangle.off"}).exit_code, 0);
+  run_to(0, "validate triangle.off --require manifold,oriented,no-self-intersection");
+  run_to(3, "validate triangle.off --require watertight");
+  run_to(0, "validate triangle.off");
 }
 
 /// OBJ text of boxes of 10 × 10 between heights, each on points of its own.
@@ -227,15 +202,16 @@ TEST_F(CliTest, QuadsOfAReferenceAreCutAsItIsSaid) {
   const std::string points = "v 0 0 0\nv 1 0 0\nv 2 1 0.5\nv 0 1 0\n";
   write("quad.obj", points + "f 1 2 3 4\n");
   write("triangles.obj", points + "f 1 2 3\nf 1 3 4\n");
-  const auto distance = [&](const std::vector<std::string>& more) {
-    std::vector<std::string> line = {"validate", "triangles.obj", "--reference", "quad.obj", "--json"};
-    line.insert(line.end(), more.begin(), more.end());
-    return Json::parse(run(line).out).at("to_reference").at("max").get<double>();
+  const auto distance = [&](const Words& more) {
+    return Json::parse(run(Words("validate triangles.obj --reference quad.obj --json") + more).out)
+        .at("to_reference")
+        .at("max")
+        .get<double>();
   };
-  EXPECT_LT(distance({"--reference-quads", "as-given"}), 1e-12);
+  EXPECT_LT(distance("--reference-quads as-given"), 1e-12);
   EXPECT_GT(distance({}), 0.05);
-  EXPECT_GT(distance({"--reference-quads", "better"}), 0.05);
-  EXPECT_EQ(run({"validate", "quad.obj", "--reference-quads", "as-given"}).exit_code, 2);
+  EXPECT_GT(distance("--reference-quads better"), 0.05);
+  run_to(2, "validate quad.obj --reference-quads as-given");
 }
 
 TEST_F(CliTest, AWatertightMeshOfAnotherSolidDoesNotMeetTheRequirement) {
@@ -243,35 +219,30 @@ TEST_F(CliTest, AWatertightMeshOfAnotherSolidDoesNotMeetTheRequirement) {
   write("reference.obj", boxes_obj({{0, 30}, {20, 60}}));
   write("three.obj", boxes_obj({{0, 19.995}, {20.005, 29.995}, {30.005, 60}}));
   write("one.obj", boxes_obj({{0, 60}}));
-  EXPECT_EQ(run({"validate", "three.obj", "--require", "watertight"}).exit_code, 0);
+  run_to(0, "validate three.obj --require watertight");
   for (const char* word : {"watertight", "solid"}) {
     const Outcome bad =
-        run({"validate", "three.obj", "--reference", "reference.obj", "--certify", "--require", word});
-    EXPECT_EQ(bad.exit_code, 3) << word;
-    EXPECT_NE(bad.out.find("does not bound the reference's solid"), std::string::npos) << bad.out;
-    EXPECT_NE(bad.out.find("Required but not met: solid."), std::string::npos) << bad.out;
-    EXPECT_EQ(run({"validate", "one.obj", "--reference", "reference.obj", "--require", word}).exit_code, 0)
-        << word;
+        run_to(3, {"validate", "three.obj", "--reference", "reference.obj", "--certify", "--require", word});
+    EXPECT_PRED2(has, bad.out, "solid");
+    EXPECT_PRED2(has, bad.out, "Required but not met: solid.");
+    run_to(0, {"validate", "one.obj", "--reference", "reference.obj", "--require", word});
   }
-  const Json report =
-      Json::parse(run({"validate", "three.obj", "--reference", "reference.obj", "--json"}).out);
+  const Json report = json_of("validate three.obj --reference reference.obj --json");
   EXPECT_EQ(report.at("solid").at("verdict"), "differs");
   EXPECT_EQ(report.at("solid").at("mesh_components"), 3);
   EXPECT_EQ(report.at("solid").at("reference_components"), 1);
-  EXPECT_EQ(run({"validate", "one.obj", "--require", "solid"}).exit_code, 2);
-  EXPECT_EQ(run({"validate", "one.obj", "--voxel-size", "1"}).exit_code, 2);
+  run_to(2, "validate one.obj --require solid");
+  run_to(2, "validate one.obj --voxel-size 1");
 }
 
 TEST_F(CliTest, WatertightIncludesOriented) {
   std::string cube = boxes_obj({{0, 10}});
   write("cube.obj", cube);
-  EXPECT_EQ(run({"validate", "cube.obj", "--require", "watertight"}).exit_code, 0);
+  run_to(0, "validate cube.obj --require watertight");
   const std::string face = "f 1 5 7 3", turned = "f 3 7 5 1";
   cube.replace(cube.find(face), face.size(), turned);
   write("turned.obj", cube);
-  const Outcome outcome = run({"validate", "turned.obj", "--require", "watertight", "--json"});
-  EXPECT_EQ(outcome.exit_code, 3);
-  EXPECT_EQ(Json::parse(outcome.out).at("watertight"), false);
+  EXPECT_EQ(json_of("validate turned.obj --require watertight --json", 3).at("watertight"), false);
 }
 
 /// Twenty beads on a string that is thinner than a voxel and lies between samples: one component, of which
@@ -294,13 +265,9 @@ TEST_F(CliTest, ManyNewComponentsAreANote) {
   }
   faces += "4 3 2 1 0\n4 316 317 318 319\n";
   write("beads.off", "OFF\n320 " + std::to_string(4 * 79 + 2) + " 0\n" + points + faces);
-  const Outcome outcome =
-      run({"remesh", "beads.off", "out.ply", "--voxel-size", "0.23", "--thin", "drop", "--max-loss", "100%"});
-  EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
-  EXPECT_NE(outcome.err.find("note: the mesh has 20 components and the polygons have 1:"), std::string::npos)
-      << outcome.err;
-  EXPECT_EQ(run({"remesh", "sphere.off", "out.ply", "--voxel-size", "0.2"}).err.find("components"),
-            std::string::npos);
+  const Outcome outcome = run_to(0, "remesh beads.off out.ply --voxel-size 0.23 --thin drop --max-loss 100%");
+  EXPECT_PRED2(has, outcome.err, "note: the mesh has 20 components and the polygons have 1:");
+  EXPECT_PRED2(lacks, run("remesh sphere.off out.ply --voxel-size 0.2").err, "components");
 }
 
 TEST_F(CliTest, ThinPartsAreKeptDroppedOrRefused) {
@@ -311,10 +278,8 @@ TEST_F(CliTest, ThinPartsAreKeptDroppedOrRefused) {
         "4 3 2 1 0\n4 4 5 6 7\n4 0 1 5 4\n4 1 2 6 5\n4 2 3 7 6\n4 3 0 4 7\n");
   for (const std::string in : {"sheet.off", "plate.off"}) {
     SCOPED_TRACE(in);
-    const auto remesh = [&](const std::vector<std::string>& more) {
-      std::vector<std::string> arguments = {"remesh", in, "out.ply", "--voxel-size", "0.05"};
-      arguments.insert(arguments.end(), more.begin(), more.end());
-      return run(arguments);
+    const auto remesh = [&](const Words& more) {
+      return run(Words{"remesh", in, "out.ply", "--voxel-size", "0.05"} + more);
     };
     const Outcome kept = remesh({"--json"});
     ASSERT_EQ(kept.exit_code, 0) << kept.err;
@@ -322,15 +287,15 @@ TEST_F(CliTest, ThinPartsAreKeptDroppedOrRefused) {
     EXPECT_GT(result.at("thickened_share").get<double>(), 0.9);
     EXPECT_NEAR(result.at("thickened_by").get<double>(), in == "sheet.off" ? 0.06 : 0.05, 1e-3);
     EXPECT_EQ(result.at("visible_loss").get<double>(), 0.0);
-    EXPECT_EQ(run({"validate", "out.ply", "--require", "watertight"}).exit_code, 0);
-    // What is dropped leaves nothing here, and what is refused is named.
-    EXPECT_EQ(remesh({"--thin", "drop"}).exit_code, 1);
-    EXPECT_EQ(remesh({"--thin", "refuse"}).exit_code, 1);
-    EXPECT_EQ(remesh({"--thin", "keep", "--isovalue", "0.1"}).exit_code, 2);
-    EXPECT_EQ(remesh({"--max-loss", "1"}).exit_code, 2);
-    EXPECT_EQ(run({"voxelize", in, "out.vdb", "--voxel-size", "0.05"}).exit_code, 0);
-    EXPECT_EQ(run({"extract", "out.vdb", "of_volume.ply"}).exit_code, 0);
-    EXPECT_EQ(run({"validate", "of_volume.ply", "--require", "watertight"}).exit_code, 0);
+    run_to(0, "validate out.ply --require watertight");
+    // Here nothing remains of dropped parts, and refused parts are named.
+    EXPECT_EQ(remesh("--thin drop").exit_code, 1);
+    EXPECT_EQ(remesh("--thin refuse").exit_code, 1);
+    EXPECT_EQ(remesh("--thin keep --isovalue 0.1").exit_code, 2);
+    EXPECT_EQ(remesh("--max-loss 1").exit_code, 2);
+    run_to(0, {"voxelize", in, "out.vdb", "--voxel-size", "0.05"});
+    run_to(0, "extract out.vdb of_volume.ply");
+    run_to(0, "validate of_volume.ply --require watertight");
   }
 }
 
@@ -341,38 +306,35 @@ TEST_F(CliTest, MuchThatIsLostIsNotMet) {
         "0 0 1.53\n1 0 1.53\n1 1 1.53\n0 1 1.53\n0 0 1.56\n1 0 1.56\n1 1 1.56\n0 1 1.56\n"
         "4 3 2 1 0\n4 4 5 6 7\n4 0 1 5 4\n4 1 2 6 5\n4 2 3 7 6\n4 3 0 4 7\n"
         "4 11 10 9 8\n4 12 13 14 15\n4 8 9 13 12\n4 9 10 14 13\n4 10 11 15 14\n4 11 8 12 15\n");
-  const Outcome dropped =
-      run({"remesh", "fin.off", "out.ply", "--voxel-size", "0.1", "--thin", "drop", "--json"});
-  EXPECT_EQ(dropped.exit_code, 3) << dropped.err;
   // The fin has two of eight squares, and its four sides.
-  EXPECT_NEAR(Json::parse(dropped.out).at("result").at("visible_loss").get<double>(), 2.12 / 8.12, 0.02);
-  EXPECT_EQ(
-      run({"remesh", "fin.off", "out.ply", "--voxel-size", "0.1", "--thin", "drop", "--max-loss", "30%"})
-          .exit_code,
-      0);
-  EXPECT_EQ(run({"remesh", "fin.off", "out.ply", "--voxel-size", "0.1", "--max-loss", "1%"}).exit_code, 0);
+  EXPECT_NEAR(json_of("remesh fin.off out.ply --voxel-size 0.1 --thin drop --json", 3)
+                  .at("result")
+                  .at("visible_loss")
+                  .get<double>(),
+              2.12 / 8.12, 0.02);
+  run_to(0, "remesh fin.off out.ply --voxel-size 0.1 --thin drop --max-loss 30%");
+  run_to(0, "remesh fin.off out.ply --voxel-size 0.1 --max-loss 1%");
 }
 
 TEST_F(CliTest, InfoOfAMesh) {
   write_cube();
-  const Outcome outcome = run({"info", "cube.off"});
-  EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
+  const Outcome outcome = run_to(0, "info cube.off");
   for (const char* text :
        {"points     8\n", "triangles  12\n", "quads      0\n", "(-1, -1, -1)", "(1, 1, 1)", "(2, 2, 2)"})
-    EXPECT_NE(outcome.out.find(text), std::string::npos) << outcome.out;
+    EXPECT_PRED2(has, outcome.out, text);
 }
 
 TEST_F(CliTest, ProgressIsShownOnATerminalAndErased) {
   write_sphere();
-  const std::vector<std::string> arguments = {"remesh", "sphere.off", "out.ply", "--resolution", "80"};
+  const Words arguments = "remesh sphere.off out.ply --resolution 80";
   const std::string erase = "\r\033[K";
   const std::string sent = terminal_output(arguments);
-  EXPECT_NE(sent.find("%"), std::string::npos) << sent;
-  EXPECT_EQ(sent.find('\n'), std::string::npos) << sent;
+  EXPECT_PRED2(has, sent, "%");
+  EXPECT_PRED2(lacks, sent, "\n");
   ASSERT_GE(sent.size(), erase.size());
   EXPECT_EQ(sent.substr(sent.size() - erase.size()), erase);
 
-  std::vector<std::string> quiet = arguments;
+  Words quiet = arguments;
   quiet.push_back("--quiet");
   EXPECT_EQ(terminal_output(quiet), "");
   EXPECT_EQ(run(arguments).err, "");
@@ -381,11 +343,9 @@ TEST_F(CliTest, ProgressIsShownOnATerminalAndErased) {
 // The program must be in the middle of its work when the signal comes: these meshes take many seconds.
 class InterruptTest : public ProgramTest {
  protected:
-  void expect_cancelled(int signal, int exit_code, std::chrono::milliseconds after,
-                        const std::vector<std::string>& arguments) {
+  void expect_cancelled(int signal, int exit_code, std::chrono::milliseconds after, const Words& arguments) {
     const std::set<std::string> before = files();
-    const Outcome outcome = run(arguments, Interruption{signal, after});
-    EXPECT_EQ(outcome.exit_code, exit_code) << outcome.out << outcome.err;
+    const Outcome outcome = run_to(exit_code, arguments, Interruption{signal, after});
     EXPECT_LT(outcome.seconds, 1.0);
     EXPECT_EQ(outcome.err, "");
     EXPECT_EQ(files(), before);
@@ -396,23 +356,22 @@ TEST_F(InterruptTest, LeavesNothingBehind) {
   write_sphere();
   for (const int milliseconds : {0, 100, 400})
     expect_cancelled(SIGINT, 130, std::chrono::milliseconds(milliseconds),
-                     {"remesh", "sphere.off", "out.ply", "--resolution", "1000"});
+                     "remesh sphere.off out.ply --resolution 1000");
 }
 
 TEST_F(InterruptTest, EndsLibraryCodeThatDoesNotPoll) {
   write_sphere();
-  expect_cancelled(
-      SIGINT, 130, std::chrono::milliseconds(700),
-      {"remesh", "sphere.off", "out.ply", "--resolution", "300", "--extractor", "cgal-surface-mesher"});
+  expect_cancelled(SIGINT, 130, std::chrono::milliseconds(700),
+                   "remesh sphere.off out.ply --resolution 300 --extractor cgal-surface-mesher");
 }
 
 TEST_F(InterruptTest, KeepsTheOlderOutput) {
   write_sphere();
   write("out.vdb", "older");
   expect_cancelled(SIGTERM, 143, std::chrono::milliseconds(300),
-                   {"voxelize", "sphere.off", "out.vdb", "--resolution", "1000"});
+                   "voxelize sphere.off out.vdb --resolution 1000");
   EXPECT_EQ(read("out.vdb"), "older");
 }
 
-}  // namespace
+}  // namespace cli_test
 }  // namespace hermesh::cli

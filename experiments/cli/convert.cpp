@@ -1,67 +1,138 @@
-// hermesh extract, remesh: level set to mesh, and polygons to level set and back to a mesh in one.
+// hermesh extract and remesh: a volume to a mesh; polygons to a level set and back to a mesh, at a voxel
+// size, within an error bound or within a budget of triangles.
 #include <algorithm>
 #include <charconv>
+#include <cmath>
 #include <memory>
-#include <optional>
 #include <sstream>
 
+#include "algorithms/core/disjoint_sets.h"
+#include "algorithms/core/run_context.h"
+#include "algorithms/extraction/adaptivity_field.h"
 #include "algorithms/extraction/explain.h"
+#include "algorithms/extraction/frustum.h"
 #include "algorithms/extraction/volume_attributes.h"
 #include "algorithms/io/vdb_file.h"
 #include "algorithms/io/written_precision.h"
-#include "experiments/cli/adaptivity.h"
-#include "experiments/cli/bounded.h"
+#include "algorithms/remesh/bounded_remesh.h"
 #include "experiments/cli/cli11.h"
-#include "experiments/cli/extracting.h"
-#include "experiments/cli/output_path.h"
-#include "experiments/cli/session.h"
-#include "experiments/cli/validators.h"
-#include "experiments/cli/voxelizing.h"
+#include "experiments/cli/conversions.h"
+#include "experiments/cli/signals.h"
+#include "validation/visible_loss.h"
 
 namespace hermesh::cli {
 namespace {
 
-struct ExtractArguments {
-  ExtractorArguments variant;
+struct ConvertArguments {
+  Paths paths;
+  VoxelizeArguments voxelizing;
+  ExtractorArguments extracting;
   double isovalue = 0.0;
-  std::string grid;    ///< empty: `sdf`, or the only scalar grid there is
-  std::string source;  ///< empty: the polygons are not at hand
+  std::string grid;    ///< empty: `sdf`, or the only scalar grid
+  std::string source;  ///< empty: the polygons of the volume are not available
   std::string ends = "closed";
   std::string attributes;  ///< names of grids to sample, or "all"; empty: none
-  AdaptivityArguments adaptivity;
-  std::string max_loss;  ///< a share with %; empty: not given
+  std::string max_loss;    ///< a share with %; empty: not given
+  // Where an adaptive extractor keeps its bound; empty: not given.
+  std::string mask, frustum, outside, tolerance_grid;
+  std::optional<int> frustum_resolution;
+  // The bound of a mesh.
+  std::string error;                      ///< a number, with % or a unit behind it; empty: not given
+  std::optional<std::int64_t> triangles;  ///< budget
+  bool over_holes = false;
+  std::optional<double> most_points;
+  double smallest_voxel = 0.0;  ///< world units; 0: not given
 };
 
-void add_extract_options(CLI::App& command, ExtractArguments& arguments, const std::string& fallback) {
-  add_extractor_options(command, arguments.variant, fallback);
-  command
-      .add_option("--isovalue", arguments.isovalue,
-                  "Value of the surface, in the units of the grid (default: 0)")
-      ->check(finite_number());
-  add_adaptivity_options(command, arguments.adaptivity);
-}
+// ---- Adaptivity.
 
-std::vector<std::string> attribute_names(const std::string& list) {
-  std::vector<std::string> names;
-  std::istringstream stream(list);
-  for (std::string name; std::getline(stream, name, ',');) {
-    if (std::ranges::find(names, name) != names.end())
-      throw UsageError("--attributes names " + name + " twice");
-    names.push_back(name);
+constexpr const char* kFrustumForm =
+    "\"px,py,pz lx,ly,lz angle aspect near far\", followed by \"ux,uy,uz\" unless the up vector is 0,1,0";
+
+/// Reads a number for each entry, with commas between them. @throws Error
+template <std::size_t N>
+std::array<double, N> read_numbers(const std::string& word, const char* form) {
+  std::istringstream stream(word);
+  std::array<double, N> numbers{};
+  char comma = ',';
+  for (std::size_t i = 0; i < N && comma == ','; ++i) {
+    stream >> numbers[i];
+    if (i + 1 < N) stream >> comma;
   }
-  return names;
+  if (!stream || stream.peek() != EOF || comma != ',') throw Error("'" + word + "' is not " + form);
+  return numbers;
 }
 
-/// The volume's mesh by the chosen extractor; messages name `paths.in`.
-PolygonMesh extract(const Paths& paths, const LevelSet& level_set, const PolygonMesh* source,
-                    const FloatHermite* hermite, const ChosenExtractor& chosen,
-                    const ExtractArguments& arguments, Session& session) {
-  const std::optional<AdaptivityField> field =
-      read_adaptivity(arguments.adaptivity, chosen.extractor, session);
-  const std::string& input = paths.in;
-  check_written_precision(paths.out, level_set);
-  const Stopwatch watch;
-  // A thickened solid has Hermite data of its own, and no ends.
+Frustum read_frustum(const std::string& text) {
+  std::istringstream stream(text);
+  std::vector<std::string> words;
+  for (std::string word; stream >> word;) words.push_back(word);
+  if (words.size() != 6 && words.size() != 7) throw Error(std::string("it must be ") + kFrustumForm);
+  const auto vector = [&](std::size_t i) {
+    return Eigen::Vector3d(read_numbers<3>(words[i], "three numbers with commas between them").data());
+  };
+  const auto number = [&](std::size_t i) { return read_numbers<1>(words[i], "a number")[0]; };
+  Frustum frustum{.position = vector(0),
+                  .look_at = vector(1),
+                  .field_of_view = number(2),
+                  .aspect = number(3),
+                  .near = number(4),
+                  .far = number(5)};
+  if (words.size() == 7) frustum.up = vector(6);
+  return frustum;
+}
+
+/// Reads the mask or the scale of a field from a file and checks it, so that an error names the file and
+/// precedes the work.
+LevelSet read_part(const std::string& file, LevelSet AdaptivityField::*part, AdaptivityField::Outside outside,
+                   Session& session) {
+  return about_file(file, [&] {
+    AdaptivityField field{.mask = {}, .outside = outside, .scale = {}};
+    field.*part = read_level_set(file, "", session.context);
+    FieldEvaluator(&field, IndexToWorld());
+    return field.*part;
+  });
+}
+
+/// Returns the field that the options request, or none. @throws UsageError for options that contradict one
+/// another, an invalid frustum, or an extractor that is not adaptive; Error for a file that cannot be used.
+std::optional<AdaptivityField> read_adaptivity(const ConvertArguments& arguments, Session& session) {
+  using Outside = AdaptivityField::Outside;
+  const bool has_mask = !arguments.mask.empty() || !arguments.frustum.empty();
+  if (!arguments.outside.empty() && !has_mask) throw UsageError("--outside needs --mask or --frustum");
+  if (arguments.frustum_resolution && arguments.frustum.empty())
+    throw UsageError("--frustum-resolution needs --frustum");
+  if (!has_mask && arguments.tolerance_grid.empty()) return std::nullopt;
+  as_usage([&] { check_adaptive(arguments.extracting.chosen.extractor); });
+  AdaptivityField field;
+  field.outside = !has_mask || arguments.outside == "everywhere" ? Outside::everywhere
+                  : arguments.outside == "nothing"               ? Outside::nothing
+                                                                 : Outside::simplify;
+  if (!arguments.mask.empty())
+    field.mask = read_part(arguments.mask, &AdaptivityField::mask, field.outside, session);
+  if (!arguments.frustum.empty()) try {
+      field.mask = frustum_mask(read_frustum(arguments.frustum), arguments.frustum_resolution.value_or(84),
+                                session.context);
+    } catch (const Error& error) {
+      throw UsageError(std::string("--frustum: ") + error.what());
+    }
+  if (!arguments.tolerance_grid.empty())
+    field.scale = read_part(arguments.tolerance_grid, &AdaptivityField::scale, field.outside, session);
+  return field;
+}
+
+// ---- Extraction.
+
+/// Returns the volume's mesh by the chosen extractor. `hermite` without `source` is that of a thickened
+/// solid.
+PolygonMesh extract(const ConvertArguments& arguments, const LevelSet& level_set, const PolygonMesh* source,
+                    const FloatHermite* hermite, Session& session) {
+  const std::optional<AdaptivityField> field = read_adaptivity(arguments, session);
+  const std::string& input = arguments.paths.in;
+  const ChosenExtractor& chosen = arguments.extracting.chosen;
+  check_written_precision(arguments.paths.out, level_set);
+  Stopwatch watch;
+  // A thickened solid has no ends of the data.
   const bool thickened = hermite && !source;
   const Ends treatment = arguments.ends == "open" ? Ends::open : Ends::closed;
   EndedMesh ended = about_file(input, [&] {
@@ -71,12 +142,12 @@ PolygonMesh extract(const Paths& paths, const LevelSet& level_set, const Polygon
                              .ends = thickened ? std::nullopt : std::optional(treatment),
                              .field = field ? &*field : nullptr,
                              .hermite = hermite,
-                             .written_in_single = is_written_in_single(paths.out)},
+                             .written_in_single = is_written_in_single(arguments.paths.out)},
                             session.context);
   });
   PolygonMesh mesh = std::move(ended.mesh);
   session.context.check();
-  // No reader takes a mesh file without polygons, ours included.
+  // No reader accepts a mesh file without polygons, ours included.
   if (mesh.empty() && field && field->outside == AdaptivityField::Outside::nothing)
     throw Error("'" + input + "': there is no surface inside the mask, nothing was written");
   if (mesh.empty())
@@ -87,58 +158,132 @@ PolygonMesh extract(const Paths& paths, const LevelSet& level_set, const Polygon
   return mesh;
 }
 
-int run_extract(const Paths& paths, const ExtractArguments& arguments, Session& session) {
-  const ChosenExtractor chosen = choose_extractor(arguments.variant);
-  const std::vector<std::string> attributes = attribute_names(arguments.attributes);
-  check_mesh_output(paths.out);
-  if (!attributes.empty()) check_keeps_attributes(paths.out);
+/// Writes the mesh; a signal that comes later has no effect.
+int save(const ConvertArguments& arguments, const PolygonMesh& mesh, Session& session,
+         int exit_code = kDone) {
+  write_output(arguments.paths.out, mesh, session);
+  work_is_finished();
+  return exit_code;
+}
+
+/// Splits the names of --attributes and checks that the output stores attributes. @throws UsageError
+std::vector<std::string> attribute_names(const ConvertArguments& arguments) {
+  std::vector<std::string> names;
+  std::istringstream stream(arguments.attributes);
+  for (std::string name; std::getline(stream, name, ',');) {
+    if (std::ranges::find(names, name) != names.end())
+      throw UsageError("--attributes names " + name + " twice");
+    names.push_back(name);
+  }
+  std::filesystem::path out = arguments.paths.out;
+  const auto is = [&](const char* ending) {
+    const std::string own = out.extension().string();
+    return std::ranges::equal(own, std::string(ending), [](char a, char b) { return (a | 0x20) == b; });
+  };
+  if (is(".gz")) out = out.stem();
+  if (!names.empty() && !is(".ply"))
+    throw UsageError("'" + arguments.paths.out + "' would lose the attributes: only .ply stores them");
+  return names;
+}
+
+int run_extract(ConvertArguments& arguments, Session& session) {
+  arguments.extracting.choose();
+  check_mesh_output(arguments.paths.out);
+  const std::vector<std::string> attributes = attribute_names(arguments);
   std::optional<PolygonMesh> source;
   if (!arguments.source.empty()) {
+    const ChosenExtractor& chosen = arguments.extracting.chosen;
     as_usage([&] { check_source_has_effect(chosen.extractor, chosen.options, arguments.isovalue); });
     source = read_polygons(arguments.source, session);
   }
-  const LevelSet level_set = read_level_set(paths.in, arguments.grid, session.context);
-  PolygonMesh mesh =
-      extract(paths, level_set, source ? &*source : nullptr, nullptr, chosen, arguments, session);
+  const LevelSet level_set = read_level_set(arguments.paths.in, arguments.grid, session.context);
+  PolygonMesh mesh = extract(arguments, level_set, source ? &*source : nullptr, nullptr, session);
   if (!attributes.empty()) {
     std::string line = "attributes";
-    for (const std::string& name : sample_attributes(mesh, paths.in, attributes, session.context))
+    for (const std::string& name : sample_attributes(mesh, arguments.paths.in, attributes, session.context))
       line += " " + name;
     print_summary(session, line);
   }
-  save(paths.out, mesh, session);
-  return kDone;
+  return save(arguments, mesh, session);
 }
 
-/// The mesh of what the samples show of the polygons.
-PolygonMesh remesh_shown(const Paths& paths, const PolygonMesh& mesh, const VoxelizeArguments& voxelizing,
-                         const ChosenVoxelizer& voxelizer, const ExtractArguments& extracting,
-                         const ChosenExtractor& chosen, Session& session) {
-  const LevelSet level_set = voxelize(mesh, paths.in, voxelizing, voxelizer, session);
-  return extract(paths, level_set, &mesh, nullptr, chosen, extracting, session);
-}
+// ---- Remeshing at a voxel size.
 
-/// The mesh of all of the polygons, of which thin parts are thickened.
-PolygonMesh remesh_all(const Paths& paths, const PolygonMesh& mesh, const VoxelizeArguments& voxelizing,
-                       const ChosenVoxelizer& voxelizer, const ExtractArguments& extracting,
-                       const ChosenExtractor& chosen, Session& session) {
-  const PolygonSolid made = sample_polygons(mesh, paths.in, voxelizing, voxelizer, session);
-  if (made.thin && chosen.options.is("crossings", "exact"))
+/// Returns the mesh of all of the polygons, with thin parts thickened.
+PolygonMesh remesh_all(const ConvertArguments& arguments, const PolygonMesh& mesh, Session& session) {
+  const PolygonSolid made = sample_polygons(mesh, arguments.paths.in, arguments.voxelizing, session);
+  const Options& options = arguments.extracting.chosen.options;
+  const bool exact_crossings = options.is("crossings", "exact");
+  if (made.thin && exact_crossings)
     throw UsageError(
-        "-o crossings=exact takes crossings from the polygons, which thickened parts are not on; use "
+        "-o crossings=exact takes crossings from the polygons, but thickened parts are not on them; use "
         "--thin drop");
-  const Options& options = chosen.options;
-  if (!made.thin &&
-      (options.is("hermite", "auto") || options.is("hermite", "exact") || options.is("crossings", "exact")))
+  if (!made.thin && (options.is("hermite", "auto") || options.is("hermite", "exact") || exact_crossings))
     if (const std::string note = missed_edges_note(made.solid.sampling); !note.empty())
       session.context.note(note);
-  return extract(paths, made.solid.level_set, made.thin ? nullptr : &mesh, &made.solid.hermite, chosen,
-                 extracting, session);
+  return extract(arguments, made.solid.level_set, made.thin ? nullptr : &mesh, &made.solid.hermite, session);
 }
 
-/// The share of the visible surface that may be lost. @throws UsageError
+/// Returns the number of sets of polygons that are connected by shared vertices.
+std::size_t count_components(const PolygonMesh& mesh) {
+  DisjointSets sets(mesh.points.size());
+  std::vector<bool> used(mesh.points.size());
+  const auto join = [&](const auto& polygons) {
+    for (const auto& polygon : polygons)
+      for (const std::uint32_t corner : polygon) used[corner] = true, sets.join(polygon[0], corner);
+  };
+  join(mesh.triangles);
+  join(mesh.quads);
+  std::size_t count = 0;
+  for (std::uint32_t i = 0; i < sets.size(); ++i) count += used[i] && sets.find(i) == i;
+  return count;
+}
+
+/// Notes that a mesh has many more components than the polygons that it was made from, in linear time and
+/// memory. A few more are expected, because intersecting polygons are one solid or several.
+void note_components(const PolygonMesh& polygons, const PolygonMesh& mesh, Session& session) {
+  const std::size_t before = count_components(polygons), after = count_components(mesh);
+  if (after < 2 * before + 8) return;
+  session.context.note(
+      "the mesh has " + std::to_string(after) + " components and the polygons have " +
+      std::to_string(before) +
+      ": gaps and walls that are about as thin as a voxel came apart; smaller voxels mostly leave fewer");
+}
+
+/// Measures and notes the share of the visible surface of the polygons that the mesh does not show
+/// (validation/visible_loss.h). Returns true if it is at most `max_loss`. @param voxel_size world units
+bool check_visible_loss(const PolygonMesh& polygons, const PolygonMesh& mesh, double voxel_size,
+                        double max_loss, Session& session) {
+  constexpr std::int64_t kSamples = 4'000;
+  const MeshFile model = to_mesh_file(polygons), file = to_mesh_file(mesh);
+  const validation::VisibleLoss loss = validation::measure_visible_loss(
+      validation::TriangleSoup(model), validation::TriangleSoup(file), voxel_size, kSamples, session.context);
+  made(session, "visible_loss", loss.lost.value);
+  made(session, "visible_loss_interval", std::vector<double>{loss.lost.lower, loss.lost.upper});
+  made(session, "visible_filled", loss.filled.value);
+  made(session, "invented_share", loss.invented.value);
+  made(session, "invented_area", loss.invented_area);
+  const auto percent = [](double share) { return text(100.0 * std::round(1e5 * share) / 1e5) + " %"; };
+  const auto interval = [&](const validation::Estimate& share) {
+    return percent(share.value) + " (" + percent(share.lower) + " to " + percent(share.upper) + ")";
+  };
+  // Single samples at edges may be wrong.
+  constexpr double kNoticeable = 1e-3;
+  if (loss.lost.value >= kNoticeable)
+    session.context.note(
+        interval(loss.lost) + " of the visible surface is not shown within half a voxel" +
+        (loss.filled.value > 0.0 ? ", of it " + percent(loss.filled.value) + " where gaps are filled" : ""));
+  if (loss.invented.value >= kNoticeable)
+    session.context.note(interval(loss.invented) + " of the mesh, an area of " + text(loss.invented_area) +
+                         ", is farther than a voxel from all polygons, as where holes are closed");
+  if (loss.lost.value <= max_loss) return true;
+  session.context.note("more than " + percent(max_loss) + " of the visible surface is lost (--max-loss)");
+  return false;
+}
+
+/// Returns the share of the visible surface that may be lost. @throws UsageError
 double most_loss(const std::string& text, ThinRule rule) {
-  // What is dropped by choice is not to go unnoticed.
+  // Parts that are dropped on request must not be lost unnoticed.
   if (text.empty()) return rule == ThinRule::drop ? 0.01 : 1.0;
   double percent = 0.0;
   const auto [end, failure] = std::from_chars(text.data(), text.data() + text.size(), percent);
@@ -148,86 +293,217 @@ double most_loss(const std::string& text, ThinRule rule) {
   return percent / 100.0;
 }
 
-int run_remesh(const Paths& paths, const VoxelizeArguments& voxelizing, const ExtractArguments& extracting,
-               Session& session) {
-  const ChosenVoxelizer voxelizer = choose_voxelizer(voxelizing);
-  const ChosenExtractor chosen = choose_extractor(extracting.variant);
+int run_remesh(ConvertArguments& arguments, Session& session) {
+  VoxelizeArguments& voxelizing = arguments.voxelizing;
+  const Paths& paths = arguments.paths;
+  voxelizing.choose();
+  arguments.extracting.choose();
   check_mesh_output(paths.out);
-  const ThinRule rule = thin_rule(voxelizing, voxelizer, extracting.isovalue);
-  // A limit holds for the loss that the user chose.
-  const double max_loss = most_loss(extracting.max_loss, voxelizing.thin ? rule : ThinRule::keep);
+  const ThinRule rule = voxelizing.thin_rule(arguments.isovalue);
+  // The default limit holds for losses that the user requested.
+  const double max_loss = most_loss(arguments.max_loss, voxelizing.thin ? rule : ThinRule::keep);
   const PolygonMesh mesh = read_polygons(paths.in, session);
-  const PolygonMesh made = rule == ThinRule::drop
-                               ? remesh_shown(paths, mesh, voxelizing, voxelizer, extracting, chosen, session)
-                               : remesh_all(paths, mesh, voxelizing, voxelizer, extracting, chosen, session);
+  const PolygonMesh made =
+      rule == ThinRule::drop
+          ? extract(arguments, voxelize(mesh, paths.in, voxelizing, session), &mesh, nullptr, session)
+          : remesh_all(arguments, mesh, session);
   note_components(mesh, made, session);
-  // Other isovalues, and parts that a mask leaves out, are not meant to show the polygons.
-  const bool is_of_polygons = extracting.isovalue == 0.0 && extracting.adaptivity.mask.empty() &&
-                              extracting.adaptivity.frustum.empty() &&
-                              !voxelizer.options.is("signs", "unsigned");
+  // Other isovalues, and parts outside a mask, do not show the polygons by intention.
+  const bool is_of_polygons = arguments.isovalue == 0.0 && arguments.mask.empty() &&
+                              arguments.frustum.empty() && !voxelizing.chosen.options.is("signs", "unsigned");
   const bool shows =
       !is_of_polygons ||
-      check_visible_loss(mesh, made, *recipe_of(mesh, paths.in, voxelizing, voxelizer).voxel_size, max_loss,
-                         session);
-  save(paths.out, made, session);
-  return shows ? kDone : kNotMet;
+      check_visible_loss(mesh, made, *voxelizing.recipe(mesh, paths.in).voxel_size, max_loss, session);
+  return save(arguments, made, session, shows ? kDone : kNotMet);
+}
+
+// ---- Remeshing within a bound.
+
+SignRule sign_rule(const VoxelizeArguments& voxelizing) {
+  const std::string rule = voxelizing.signs.value_or("winding-number");
+  if (rule == "winding-number") return SignRule::winding_number;
+  if (rule == "flood-fill") return SignRule::flood_fill;
+  if (rule == "auto") return SignRule::automatic;
+  throw UsageError(
+      "a bound needs an inside: --signs must be winding-number (the default with --error and --triangles), "
+      "flood-fill or auto, not '" +
+      rule + "'");
+}
+
+/// Returns the error in world units, which are metres if `units`, those of the file's coordinates, are given.
+/// @param text a number, with % or a unit behind it
+/// @param diagonal of the bounding box of the polygons, world units
+/// @throws UsageError
+double error_in_world_units(const std::string& text, const std::string& units, double diagonal) {
+  double value = 0.0;
+  const auto [end, failure] = std::from_chars(text.data(), text.data() + text.size(), value);
+  const std::string unit(end, text.data() + text.size());
+  if (failure != std::errc() || !std::isfinite(value) || value <= 0.0)
+    throw UsageError("--error must be a number above 0, such as 0.05, 0.1% or 0.05mm, not '" + text + "'");
+  if (unit.empty()) return value;
+  if (unit == "%") return value / 100.0 * diagonal;
+  const std::optional<double> metres = metres_in(unit);
+  if (!metres) throw UsageError("--error '" + text + "' has an unknown unit; see --units");
+  if (units.empty())
+    throw UsageError("--error '" + text +
+                     "' has a unit, but mesh files have none; pass --units with that of the coordinates");
+  return value * *metres;
+}
+
+int run_bounded(const ConvertArguments& arguments, const CLI::App& command, Session& session) {
+  refuse_idle(command,
+              {"--extractor", "-o", "--voxelizer", "--voxelizer-option", "--exterior-band", "--interior-band",
+               "--isovalue", "--max-loss", "--mask", "--frustum", "--frustum-resolution", "--outside",
+               "--tolerance-grid"},
+              "with --error and --triangles the method is chosen for the bound");
+  const auto error = [&](double diagonal) {
+    return arguments.triangles ? 0.0 : error_in_world_units(arguments.error, session.units, diagonal);
+  };
+  error(1.0);
+  const Paths& paths = arguments.paths;
+  BoundedRemeshOptions options{
+      .signs = sign_rule(arguments.voxelizing),
+      .over_holes = arguments.over_holes,
+      .most_points = arguments.most_points.value_or(arguments.triangles ? 4e5 : 3e7),
+      .smallest_voxel = arguments.smallest_voxel,
+      .written_in_single = is_written_in_single(paths.out),
+      .thin = arguments.voxelizing.thin.value_or("keep") == "keep" ? ThinRule::keep : ThinRule::drop};
+  check_mesh_output(paths.out);
+  const PolygonMesh mesh = read_polygons(paths.in, session);
+  const double diagonal = bounds(mesh).size().norm();
+  options.error = error(diagonal);
+  Stopwatch watch;
+  const BoundedMesh made = about_file(paths.in, [&] {
+    if (!(diagonal > 0.0)) throw Error("the polygons have no extent");
+    return arguments.triangles
+               ? remesh_to_budget(mesh, std::size_t(*arguments.triangles), options, session.context)
+               : bounded_remesh(mesh, options, session.context);
+  });
+  session.context.check();
+  if (!made.unmet.empty())
+    throw Error("'" + paths.in + "': " +
+                (arguments.triangles
+                     ? "no mesh of " + std::to_string(*arguments.triangles) + " triangles was found: "
+                     : "") +
+                explanation(made) + "; nothing was written");
+  session.context.figure("error_asked", made.error);
+  session.context.figure("certified_to_polygons", made.to_surface);
+  session.context.figure("certified_from_polygons", made.from_surface);
+  session.context.figure("voxel_size", made.voxel_size);
+  session.context.figure("triangles", double(made.mesh.triangle_count()));
+  session.context.figure("rounds", made.rounds);
+  if (made.free_area > 0.0) session.context.figure("area_that_bounds_nothing", made.free_area);
+  if (made.hole_area > 0.0) session.context.figure("hole_area", made.hole_area);
+  for (const std::string& note : notes(made)) session.context.note(note);
+  note_thin_parts(made.thin, made.voxel_size, session);
+  print_extracted(session, made.mesh, "voxels of " + text(made.voxel_size), watch.seconds());
+  const double bound = std::max(made.to_surface, made.from_surface);
+  print_summary(session, "certified: the mesh is within " + text(made.to_surface) +
+                             " of the polygons' solid, and the solid within " + text(made.from_surface) +
+                             " of the mesh (" + text(100.0 * bound / diagonal) + "% of the diagonal)");
+  note_components(mesh, made.mesh, session);
+  return save(arguments, made.mesh, session);
+}
+
+// ---- The command line.
+
+void add_extract_options(CLI::App& command, ConvertArguments& arguments, const std::string& fallback) {
+  add_extractor_options(command, arguments.extracting, fallback);
+  command
+      .add_option("--isovalue", arguments.isovalue,
+                  "Value of the surface, in the units of the grid (default: 0)")
+      ->check(finite_number());
+  CLI::Option_group* group =
+      command.add_option_group("Where an adaptive extractor keeps its bound (see also --outside)");
+  CLI::Option* mask = group->add_option(
+      "--mask", arguments.mask,
+      "A .vdb with the region: where a level set is negative, where any other scalar grid differs from its "
+      "background");
+  group
+      ->add_option("--frustum", arguments.frustum,
+                   std::string("In place of a mask the view of a camera: ") + kFrustumForm +
+                       "; position, point looked at, vertical angle in degrees, width over height, distances "
+                       "of the clipping planes in world units")
+      ->excludes(mask);
+  group
+      ->add_option("--frustum-resolution", arguments.frustum_resolution,
+                   "Voxels along the longest side of the frustum's mask (default: 84)")
+      ->check(CLI::Range(8, 4096));
+  group
+      ->add_option("--outside", arguments.outside,
+                   "Outside the mask: simplify (default) merges as far as the topology allows "
+                   "(manifold-dual-contouring: up to 8 voxels), nothing makes no polygons, so the mesh is "
+                   "open and its boundary may touch itself, everywhere keeps the bound there, too")
+      ->check(CLI::IsMember({"everywhere", "simplify", "nothing"}));
+  group->add_option("--tolerance-grid", arguments.tolerance_grid,
+                    "A .vdb whose values, none negative, scale the extractor's bound; the background applies "
+                    "beyond its data");
+}
+
+void add_bound_options(CLI::App& command, CLI::App& size, ConvertArguments& arguments) {
+  size.add_option("--error", arguments.error,
+                  "In place of a size the certified bound of the two-sided distance between the mesh and the "
+                  "polygons' solid: in world units, with % of the bounding box's diagonal, or, with --units, "
+                  "with a unit (0.05mm)");
+  size.add_option("--triangles", arguments.triangles,
+                  "In place of a size the maximum number of triangles; the mesh has the smallest certified "
+                  "error found")
+      ->transform(whole_number(4, std::int64_t(1) << 31));
+  CLI::Option_group* group = command.add_option_group("With --error or --triangles");
+  group->add_flag("--over-holes", arguments.over_holes,
+                  "Allow the mesh to close holes; the bound there is to the surface where the winding number "
+                  "is 1/2");
+  group
+      ->add_option("--limit-points", arguments.most_points,
+                   "Maximum number of vertices of the finest mesh (default: 3e7, some 9 GiB, with --error; "
+                   "4e5 per attempt with --triangles); the command fails if the bound needs more")
+      ->check(CLI::Range(1e3, 1e9));
+  group
+      ->add_option(
+          "--smallest-voxel", arguments.smallest_voxel,
+          "Smallest voxel size to try, in world units (default: an eighth of the error); the command "
+          "fails if a wall or gap is too thin for it")
+      ->check(CLI::PositiveNumber);
 }
 
 }  // namespace
 
 void add_conversions(CLI::App& app, Session& session) {
-  struct Arguments {
-    Paths paths;
-    VoxelizeArguments voxelizing;
-    ExtractArguments extracting;
-    BoundArguments bound;
-  };
-  auto arguments = std::make_shared<Arguments>();
-
-  CLI::App* command = add_command(app, session, "extract", "A volume to a mesh");
+  auto arguments = std::make_shared<ConvertArguments>();
+  CLI::App* command = add_command(app, session, "extract", "Convert a volume to a mesh");
   add_paths(*command, session, arguments->paths, "Volume: .vdb, or - for the standard input",
             FileKind::volume, kMeshOut, FileKind::mesh, true);
   add_json_option(*command, session);
-  add_extract_options(*command, arguments->extracting, "dual-contouring");
-  command->add_option("--grid,--grid-name", arguments->extracting.grid,
-                      "Name of the grid (default: sdf, or the only scalar grid there is)");
-  command->add_option("--source", arguments->extracting.source,
-                      "Mesh that the volume was made from, for extractors that want exact Hermite data");
+  add_extract_options(*command, *arguments, "dual-contouring");
+  command->add_option("--grid,--grid-name", arguments->grid,
+                      "Name of the grid (default: sdf, or the only scalar grid)");
+  command->add_option("--source", arguments->source,
+                      "Mesh that the volume was made from, for extractors that use exact Hermite data");
   command
-      ->add_option("--ends", arguments->extracting.ends,
-                   "Where the surface runs into the end of the data: closed (the default), a flat cap half a "
-                   "voxel beyond "
-                   "the last samples, or open, cut off at these")
+      ->add_option("--ends", arguments->ends,
+                   "Where the surface reaches the end of the data: closed (default) by a flat cap half a "
+                   "voxel beyond the last samples, or open, cut off at these")
       ->check(CLI::IsMember({"closed", "open"}));
   command->add_option(
-      "--attributes", arguments->extracting.attributes,
-      "Grids of the volume, separated by commas, or all: sampled at the mesh's points, for .ply");
-  command->callback([arguments, &session] {
-    session.command = [arguments, &session] {
-      return run_extract(arguments->paths, arguments->extracting, session);
-    };
-  });
+      "--attributes", arguments->attributes,
+      "Grids of the volume, separated by commas, or all, to sample at the vertices, for .ply");
+  set_work(*command, session, [arguments, &session] { return run_extract(*arguments, session); });
 
-  arguments = std::make_shared<Arguments>();
-  command = add_command(app, session, "remesh", "Polygons to a level set and back to a mesh");
+  arguments = std::make_shared<ConvertArguments>();
+  command = add_command(app, session, "remesh", "Convert polygons to a level set and back to a mesh");
   add_paths(*command, session, arguments->paths, kMeshIn, FileKind::mesh, kMeshOut, FileKind::mesh, true);
   add_json_option(*command, session);
   CLI::App* size = add_voxelize_options(*command, arguments->voxelizing);
-  add_extract_options(*command, arguments->extracting, "manifold-dual-contouring");
-  command->add_option(
-      "--max-loss", arguments->extracting.max_loss,
-      "Exit with 3 if more of the visible surface than this is lost, such as 1% (default: no limit, or 1% "
-      "with --thin drop)");
-  add_bound_options(*command, *size, arguments->bound);
-  command->callback([arguments, command, &session] {
-    session.command = [arguments, command, &session] {
-      if (arguments->bound.asked()) {
-        check_bound_options(*command, arguments->bound, arguments->voxelizing, session.units);
-        return run_bounded(arguments->paths, arguments->bound, arguments->voxelizing, session);
-      }
-      refuse_without_bound(*command);
-      return run_remesh(arguments->paths, arguments->voxelizing, arguments->extracting, session);
-    };
+  add_extract_options(*command, *arguments, "manifold-dual-contouring");
+  command->add_option("--max-loss", arguments->max_loss,
+                      "Exit with 3 if more of the visible surface is lost, such as 1% (default: no limit, or "
+                      "1% with --thin drop)");
+  add_bound_options(*command, *size, *arguments);
+  set_work(*command, session, [arguments, command, &session] {
+    if (arguments->triangles || !arguments->error.empty()) return run_bounded(*arguments, *command, session);
+    refuse_idle(*command, {"--over-holes", "--limit-points", "--smallest-voxel"},
+                "it needs --error or --triangles");
+    return run_remesh(*arguments, session);
   });
 }
 

@@ -1,31 +1,24 @@
-// hermesh fracture: a solid into pieces, one file each, with a ledger.
+// hermesh fracture: breaks a solid into pieces, one file each, with a conservation check.
 #include <algorithm>
 #include <iostream>
 #include <memory>
 
 #include "algorithms/hermite/samplers.h"
-#include "algorithms/io/mesh_file.h"
 #include "algorithms/io/vdb_file.h"
+#include "experiments/cli/child_run.h"
 #include "experiments/cli/cli11.h"
-#include "experiments/cli/format.h"
-#include "experiments/cli/pipeline/child_run.h"
-#include "experiments/cli/pipeline/json_report.h"
-#include "experiments/cli/session.h"
+#include "experiments/cli/conversions.h"
 #include "experiments/cli/signals.h"
-#include "experiments/cli/validators.h"
-#include "experiments/cli/voxelizing.h"
 #include "experiments/fracture/fracture_folder.h"
 #include "experiments/fracture/fracture_run.h"
 
 namespace hermesh::cli {
 namespace {
 
-constexpr const char* kSizeGroup = "Voxel size, exactly one of";
-
 struct FractureArguments {
   Paths paths;
   VoxelizeArguments voxelizing;
-  std::string grid;  ///< empty: `sdf`, or the only scalar grid there is
+  std::string grid;  ///< empty: `sdf`, or the only scalar grid
   std::string cutters, hermite = "auto", density, rule = "printed";
   FractureMethod method;
   CutterChoices choices;
@@ -34,9 +27,9 @@ struct FractureArguments {
   bool no_split = false, no_picture = false, judge = false;
 };
 
-/// Has hermesh-lab, which has the libraries for pictures, draw the pieces. Without a picture, the fracture is
-/// as good.
-void draw_picture(const std::filesystem::path& made, Session& session) {
+/// Starts hermesh-lab, which links the libraries for pictures, to draw the pieces; notes if there is no
+/// picture.
+void draw_picture(const std::filesystem::path& pieces, Session& session) {
   const Stage stage(session.context, "picture");
   const std::filesystem::path program =
       std::filesystem::canonical("/proc/self/exe").parent_path() / "hermesh-lab";
@@ -46,7 +39,7 @@ void draw_picture(const std::filesystem::path& made, Session& session) {
         "exploded.png was not drawn: hermesh-lab is not installed; install it or pass --no-picture");
     return;
   }
-  ChildRun child(program, {"exploded", made});
+  ChildRun child(program, {"exploded", pieces});
   while (!child.has_ended()) {
     session.context.check();
     ChildRun::wait_for_any({&child}, 100);
@@ -56,39 +49,38 @@ void draw_picture(const std::filesystem::path& made, Session& session) {
 
 bool is_volume(const std::string& path) { return path.ends_with(".vdb"); }
 
-/// Reads the object to break; its polygons, if it has any, are kept in `source`.
-FractureObject read_object(const FractureArguments& arguments, std::optional<PolygonMesh>& source,
+/// Reads the object to break; `source` holds its polygons, if it has any.
+FractureObject read_object(FractureArguments& arguments, std::optional<PolygonMesh>& source,
                            Session& session) {
   FractureObject object;
   const bool sized = arguments.voxelizing.voxel_size || arguments.voxelizing.resolution;
   if (is_volume(arguments.paths.in)) {
     if (sized)
       throw UsageError("'" + arguments.paths.in +
-                       "' has voxels already: leave out --resolution and --voxel-size");
+                       "' already has voxels: leave out --resolution and --voxel-size");
     if (arguments.hermite == "exact") throw UsageError("--hermite exact needs polygons, not a volume");
     object.level_set = read_level_set(arguments.paths.in, arguments.grid, session.context);
     object.hermite = about_file(arguments.paths.in,
                                 [&] { return sample_level_set(object.level_set, 0.0, session.context); });
     return object;
   }
-  if (!sized) throw UsageError("say how large voxels are: --resolution N or --voxel-size S");
-  const ChosenVoxelizer chosen = choose_voxelizer(arguments.voxelizing);
+  if (!sized) throw UsageError("the voxel size is missing: pass --resolution N or --voxel-size S");
+  arguments.voxelizing.choose();
   source = read_polygons(arguments.paths.in, session, {.attributes = true});
   object.source = &*source;
-  PolygonSolid made = sample_polygons(*source, arguments.paths.in, arguments.voxelizing, chosen, session);
+  PolygonSolid made = sample_polygons(*source, arguments.paths.in, arguments.voxelizing, session);
   object.level_set = std::move(made.solid.level_set);
   object.hermite = arguments.hermite == "level-set" ? sample_level_set(object.level_set, 0.0, session.context)
                                                     : std::move(made.solid.hermite);
   return object;
 }
 
-nlohmann::ordered_json head_of(const FractureArguments& arguments, const FractureObject& object) {
+Json head_of(const FractureArguments& arguments, const FractureObject& object) {
   const Eigen::Vector3d& origin = object.hermite.placement.origin;
   return {{"object", std::filesystem::path(arguments.paths.in).filename().string()},
           {"method", arguments.method.name},
           {"tolerance", arguments.method.tolerance},
-          {"rule", arguments.method.name == "thesis" ? nlohmann::ordered_json(arguments.rule)
-                                                     : nlohmann::ordered_json()},
+          {"rule", arguments.method.name == "thesis" ? Json(arguments.rule) : Json()},
           {"cutters_given", without_folders(arguments.cutters)},
           {"seed", arguments.choices.seed},
           {"voxel_size", object.level_set.voxel_size()},
@@ -98,17 +90,14 @@ nlohmann::ordered_json head_of(const FractureArguments& arguments, const Fractur
 
 void summarise(const FractureSummary& summary, Session& session) {
   made(session, "pieces", summary.pieces);
-  if (summary.labelled) {
-    made(session, "changed_samples", summary.labelled->repair.changed_samples);
-    made(session, "merged_slivers", summary.labelled->merged.size());
-  }
   std::string line =
       "broke into " + std::to_string(summary.pieces) + " pieces, " + seconds_text(summary.seconds);
   if (const auto& labelled = summary.labelled) {
-    line += "; " + std::to_string(labelled->repair.changed_samples) +
-            " samples changed their piece to keep it manifold";
-    if (!labelled->merged.empty())
-      line += ", " + std::to_string(labelled->merged.size()) + " slivers joined a neighbour";
+    const std::size_t changed = labelled->repair.changed_samples, merged = labelled->merged.size();
+    made(session, "changed_samples", changed);
+    made(session, "merged_slivers", merged);
+    line += "; " + std::to_string(changed) + " samples changed their piece to keep it manifold";
+    if (merged > 0) line += ", " + std::to_string(merged) + " slivers joined a neighbour";
   }
   print_summary(session, line);
 }
@@ -125,8 +114,8 @@ void note_idle_cutters(const FractureSummary& summary, Session& session) {
                          " more cutters cut nothing; pieces.json has the state of each");
 }
 
-/// Returns why the pieces of the method `labelled`, which keeps volumes at any tolerance, may hold less than
-/// the uncut mesh.
+/// Returns the reason why the pieces of the method `labelled`, which preserves volumes at any tolerance, may
+/// have less volume than the uncut mesh.
 std::string cause_of_loss(const FractureSummary& summary) {
   const std::string thin = "parts thinner than two voxels end in a sharp edge at cuts";
   if (!summary.labelled || summary.labelled->gaps + summary.labelled->touches == 0) return thin;
@@ -134,11 +123,11 @@ std::string cause_of_loss(const FractureSummary& summary) {
   return summary.labelled->cut_edges == 0 ? apart : apart + ", and " + thin;
 }
 
-/// Whether the pieces are right by themselves; a loss of volume is said in a note, as it is of surfaces.
-bool report_ledger(const validation::FractureLedger& ledger, const FractureSummary& summary,
+/// Prints the validation of the pieces; returns true if they are consistent. Notes a loss of volume.
+bool report_ledger(const validation::FractureReport& ledger, const FractureSummary& summary,
                    Session& session) {
   std::vector<std::string> lines = ledger.sentences();
-  for (const std::string& place : ledger.places) lines.push_back("  " + place);
+  for (const std::string& location : ledger.places) lines.push_back("  " + location);
   lines.push_back("original surface: " + std::to_string(ledger.rest_triangles) + " triangles, volume " +
                   text(ledger.rest_volume) + "; the pieces' volumes differ from it by " +
                   text(ledger.volume_difference()) + " of it" +
@@ -158,7 +147,7 @@ bool report_ledger(const validation::FractureLedger& ledger, const FractureSumma
   return ledger.is_consistent();
 }
 
-/// Refuses options that were given and that nothing would look at. @throws UsageError
+/// Refuses options that have no effect. @throws UsageError
 void refuse_idle_options(const FractureArguments& arguments, const CutterSpec& spec,
                          const CLI::App& command) {
   using Kind = CutterSpec::Kind;
@@ -166,26 +155,25 @@ void refuse_idle_options(const FractureArguments& arguments, const CutterSpec& s
     refuse_idle(command,
                 {"--voxelizer", "--voxelizer-option", "--signs", "--exterior-band", "--interior-band",
                  "--scale", "--units"},
-                "'" + arguments.paths.in + "' has voxels already");
+                "'" + arguments.paths.in + "' already has voxels");
   else
     refuse_idle(command, {"--grid"}, "'" + arguments.paths.in + "' has polygons, no grids");
   if (arguments.method.name != "labelled")
-    refuse_idle(command, {"--min-volume", "--no-split"}, "only --method labelled looks at it");
-  if (arguments.method.name != "thesis") refuse_idle(command, {"--rule"}, "only --method thesis looks at it");
+    refuse_idle(command, {"--min-volume", "--no-split"}, "only --method labelled uses it");
+  if (arguments.method.name != "thesis") refuse_idle(command, {"--rule"}, "only --method thesis uses it");
   if (spec.kind != Kind::chunks) refuse_idle(command, {"--roughness"}, "only the walls of chunks are rough");
   const bool copies =
       std::ranges::any_of(spec.files, [](const CutterSpec::File& file) { return file.copies > 0; });
   if (!copies) refuse_idle(command, {"--mesh-scale"}, "no meshes are scattered (mesh:FILE*N)");
   if (spec.count == 0 && !copies)
     refuse_idle(command, {"--seed", "--impact", "--impact-radius", "--density"},
-                "these cutters are in place, nothing is scattered");
+                "these cutters are fixed, nothing is scattered");
   if (!arguments.density.empty())
-    refuse_idle(command, {"--impact", "--impact-radius"}, "--density says where places are scattered");
+    refuse_idle(command, {"--impact", "--impact-radius"}, "--density determines the scattered positions");
   if (arguments.impact.empty()) refuse_idle(command, {"--impact-radius"}, "there is no --impact");
 }
 
-int run_fracture_command(const FractureArguments& given, const CLI::App& command, Session& session) {
-  FractureArguments arguments = given;
+int run_fracture_command(FractureArguments& arguments, const CLI::App& command, Session& session) {
   const CutterSpec spec = as_usage([&] { return parse_cutters(arguments.cutters); });
   as_usage([&] { check_method(arguments.method); });
   refuse_idle_options(arguments, spec, command);
@@ -204,7 +192,7 @@ int run_fracture_command(const FractureArguments& given, const CLI::App& command
   const FractureObject object = read_object(arguments, source, session);
   if (object.hermite.leaves.empty())
     throw Error("'" + arguments.paths.in +
-                "' has no inside at this size of voxel, so there is nothing to break");
+                "' has no inside at this voxel size, so there is nothing to break");
   const MadeCutters cutters = make_cutters(spec, object.hermite, arguments.choices, session.context);
   FractureFolder folder(arguments.paths.out);
   const FractureSummary summary = run_fracture(
@@ -214,40 +202,45 @@ int run_fracture_command(const FractureArguments& given, const CLI::App& command
   if (summary.pieces == 0) throw Error("no piece has a surface, nothing was written");
   summarise(summary, session);
   note_idle_cutters(summary, session);
-  const bool balances =
-      !arguments.judge || report_ledger(folder.judge(session.context, uncut_mesh(object, session.context),
-                                                     reach_of_pieces(object, arguments.method, summary)),
-                                        summary, session);
+  bool consistent = true;
+  if (arguments.judge) {
+    const PolygonMesh uncut = uncut_mesh(object, session.context);
+    const double reach = reach_of_pieces(object, arguments.method, summary);
+    consistent = report_ledger(folder.judge(session.context, uncut, reach), summary, session);
+  }
   FractureFolder::Draw draw;
-  if (!arguments.no_picture) draw = [&](const std::filesystem::path& made) { draw_picture(made, session); };
+  if (!arguments.no_picture)
+    draw = [&](const std::filesystem::path& pieces) { draw_picture(pieces, session); };
   folder.commit(head_of(arguments, object), summary, draw, session.context);
   work_is_finished();
-  return balances ? kDone : kNotMet;
+  return consistent ? kDone : kNotMet;
 }
 
 void add_cutter_options(CLI::App& command, FractureArguments& arguments) {
   command
       .add_option(
           "--cutters", arguments.cutters,
-          "voronoi:N, chunks:N (Voronoi cells with rough walls), planes:N, planes:NX,NY,NZ,D;... (N.x = D), "
-          "mesh:FILE,... (one after another, in place) or mesh:FILE*N (N copies, scattered and turned)")
+          "voronoi:N, chunks:N (Voronoi cells with rough walls), planes:N, planes:NX,NY,NZ,D;... "
+          "(N.x = D), mesh:FILE,... (one after another, in place) or mesh:FILE*N (N copies, scattered "
+          "and rotated)")
       ->required();
-  command.add_option("--seed", arguments.choices.seed, "Of everything random (default: 0)");
+  command.add_option("--seed", arguments.choices.seed, "Random seed (default: 0)");
   command
-      .add_option(
-          "--roughness", arguments.choices.roughness,
-          "How far the walls of chunks are displaced, as a part of the distance of seeds (default: 0.12)")
+      .add_option("--roughness", arguments.choices.roughness,
+                  "Displacement of the walls of chunks, relative to the distance of seeds (default: 0.12)")
       ->check(finite_number() & CLI::Range(0.0, 1.0));
   command.add_option("--impact", arguments.impact, "X Y Z: scatter densest about this point (world units)")
       ->expected(3)
       ->check(finite_number());
   command
-      .add_option(
-          "--impact-radius", arguments.choices.impact_radius,
-          "Where the density about the impact has halved (world units; default: a quarter of the object)")
+      .add_option("--impact-radius", arguments.choices.impact_radius,
+                  "Distance from the impact at which the density has halved (world units; default: a quarter "
+                  "of the object)")
       ->check(finite_number() & CLI::PositiveNumber);
   command.add_option("--density", arguments.density, "A .vdb: scatter in proportion to its values");
-  command.add_option("--mesh-scale", arguments.choices.mesh_scale, "Of scattered meshes (default: 1)")
+  command
+      .add_option("--mesh-scale", arguments.choices.mesh_scale,
+                  "Scale factor of the scattered cutters (default: 1)")
       ->check(finite_number() & CLI::PositiveNumber);
 }
 
@@ -259,50 +252,41 @@ void add_fracture(CLI::App& app, Session& session) {
       add_command(app, session, "fracture", "Break a solid into pieces that fit without a gap");
   add_paths(*command, session, arguments->paths, std::string(kMeshIn) + ", or a level set: .vdb",
             FileKind::mesh_or_volume,
-            "Folder for one PLY a piece, pieces.json and exploded.png; must not be there, or be empty",
+            "Directory for one PLY per piece, pieces.json and exploded.png; must not exist, or be empty",
             FileKind::folder);
   add_json_option(*command, session);
   command->add_option("--grid,--grid-name", arguments->grid,
-                      "Name of the grid of a .vdb (default: sdf, or the only scalar grid there is)");
-  add_voxelize_options(*command, arguments->voxelizing);
-  command->get_option_group(kSizeGroup)->require_option(0, 1);
+                      "Name of the grid of a .vdb (default: sdf, or the only scalar grid)");
+  add_voxelize_options(*command, arguments->voxelizing)->require_option(0, 1);
   add_cutter_options(*command, *arguments);
   command->add_option("--method", arguments->method.name, "labelled, thesis or openvdb (default: labelled)")
       ->check(CLI::IsMember({"labelled", "thesis", "openvdb"}));
   command
-      ->add_option(
-          "--tolerance", arguments->method.tolerance,
-          "labelled: how far the pieces may be from their finest meshes, in voxels, or less where more than "
-          "1 % "
-          "of a part's volume would change; thesis: the root of its QEF threshold, in voxels: cells merge "
-          "while "
-          "the sum of their squared distances to all planes is below its square; openvdb: its adaptivity "
-          "(default: 0, nothing is merged)")
+      ->add_option("--tolerance", arguments->method.tolerance,
+                   "labelled: maximum distance of the pieces from their finest meshes, in voxels, less where "
+                   "more than 1 % of a part's volume would change; thesis: square root of the QEF threshold, "
+                   "in voxels; openvdb: its adaptivity (default: 0, nothing is merged)")
       ->check(finite_number());
   command
       ->add_option("--rule", arguments->rule,
                    "thesis: printed combines 10-byte voxels by eq. 7.1; repaired combines exact data by "
-                   "signs (default: "
-                   "printed)")
+                   "signs (default: printed)")
       ->check(CLI::IsMember({"printed", "repaired"}));
   command
-      ->add_option(
-          "--min-volume", arguments->least_volume,
-          "Voxels: smaller pieces join the neighbour that they share most with; 0 keeps all (default: 27)")
+      ->add_option("--min-volume", arguments->least_volume,
+                   "Smallest piece, in voxels; smaller ones join the neighbour with the largest common "
+                   "boundary; 0 keeps all (default: 27)")
       ->check(CLI::Range(0.0, 1e15));
-  command->add_flag("--no-split", arguments->no_split, "Leave a piece that falls apart one piece");
+  command->add_flag("--no-split", arguments->no_split, "Keep the disconnected parts of a piece as one piece");
   command->add_flag("--no-picture", arguments->no_picture, "Do not draw exploded.png");
   command->add_flag("--judge", arguments->judge,
-                    "Read the files back and judge whether the books balance; if not, the exit code is 3");
+                    "Read the files back and validate volumes and seams; exit code 3 on failure");
   command
       ->add_option("--hermite", arguments->hermite,
                    "Data of the object: auto, exact from polygons, or level-set")
       ->check(CLI::IsMember({"auto", "exact", "level-set"}));
-  command->callback([arguments, command, &session] {
-    session.command = [arguments, command, &session] {
-      return run_fracture_command(*arguments, *command, session);
-    };
-  });
+  set_work(*command, session,
+           [arguments, command, &session] { return run_fracture_command(*arguments, *command, session); });
 }
 
 }  // namespace hermesh::cli

@@ -1,17 +1,13 @@
-// hermesh import: scalar volumes of other programs to .vdb.
+// hermesh import: converts scalar volumes of other programs to .vdb.
 #include <charconv>
 #include <cmath>
 #include <memory>
 
-#include "algorithms/core/value_range.h"
+#include "algorithms/core/level_set.h"
+#include "algorithms/core/run_context.h"
 #include "algorithms/io/import/import_volume.h"
 #include "experiments/cli/cli11.h"
-#include "experiments/cli/format.h"
-#include "experiments/cli/output_path.h"
-#include "experiments/cli/pipeline/json_report.h"
 #include "experiments/cli/signals.h"
-#include "experiments/cli/validators.h"
-#include "experiments/cli/voxelizing.h"
 
 namespace hermesh::cli {
 namespace {
@@ -44,8 +40,7 @@ std::array<T, 3> three_numbers(const std::string& option, const std::string& giv
 }
 
 RawLayout raw_layout(const ImportArguments& arguments, Session& session) {
-  if (!arguments.type)
-    throw UsageError("--dims makes the input raw samples: say of which --type, such as int16le");
+  if (!arguments.type) throw UsageError("--dims declares raw samples: pass their --type, such as int16le");
   RawLayout layout;
   layout.dims = three_numbers<std::int64_t>("--dims", *arguments.dims);
   layout.format = as_usage([&] { return parse_sample_format(*arguments.type); });
@@ -53,18 +48,18 @@ RawLayout raw_layout(const ImportArguments& arguments, Session& session) {
   if (arguments.spacing)
     layout.spacing = three_numbers<double>("--spacing", *arguments.spacing);
   else
-    session.context.note("no --spacing was given; 1,1,1 was taken");
-  if (arguments.frame) throw UsageError("--frame is about NIfTI files; for raw samples use --offset");
+    session.context.note("no --spacing was given; 1,1,1 is assumed");
+  if (arguments.frame) throw UsageError("--frame concerns NIfTI files; for raw samples use --offset");
   return layout;
 }
 
 void check_nifti(const ImportArguments& arguments) {
   if (arguments.type || arguments.spacing || arguments.offset != 0)
-    throw UsageError("--type, --spacing and --offset are about raw samples: give their --dims, too");
+    throw UsageError("--type, --spacing and --offset concern raw samples: pass their --dims, too");
   if (!is_nifti_path(arguments.paths.in))
     throw UsageError(
-        "cannot tell what '" + arguments.paths.in +
-        "' is: its name ends neither in .nii, .hdr nor .img (.gz may follow); for raw samples give --dims, "
+        "unknown format of '" + arguments.paths.in +
+        "': its name ends neither in .nii, .hdr nor .img (.gz may follow); for raw samples pass --dims, "
         "--type and --spacing");
 }
 
@@ -81,7 +76,7 @@ int run_import(const ImportArguments& arguments, Session& session) {
   else
     check_nifti(arguments);
   check_volume_output(arguments.paths.out);
-  const Stopwatch watch;
+  Stopwatch watch;
   const LevelSet volume = layout ? import_raw(arguments.paths.in, *layout, options, session.context)
                                  : import_nifti(arguments.paths.in, options, session.context);
   write_imported(arguments.paths.out, volume, session.context);
@@ -103,8 +98,8 @@ int run_import(const ImportArguments& arguments, Session& session) {
 
 void add_import(CLI::App& app, Session& session) {
   const auto arguments = std::make_shared<ImportArguments>();
-  CLI::App* command =
-      add_command(app, session, "import", "A volume of another program (NIfTI-1, raw samples) to .vdb");
+  CLI::App* command = add_command(app, session, "import",
+                                  "Convert a volume of another program (NIfTI-1, raw samples) to .vdb");
   add_paths(
       *command, session, arguments->paths,
       "Volume: .nii .hdr .img, or with --dims raw samples; all also gzipped; or - for the standard input",
@@ -112,24 +107,22 @@ void add_import(CLI::App& app, Session& session) {
       FileKind::volume);
   add_json_option(*command, session);
   command->add_option("--frame", arguments->frame,
-                      "Which of a NIfTI file's volumes, from 0 (default: the first)");
+                      "Index of the volume in a NIfTI file, from 0 (default: the first)");
   command->add_option("--dims", arguments->dims,
-                      "Raw: X,Y,Z, the numbers of samples; x is fastest in the file");
+                      "Raw: X,Y,Z, the numbers of samples; x varies fastest in the file");
   command->add_option(
       "--type", arguments->type,
-      "Raw: uint8, int8, uint16, int16, uint32, int32, uint64, int64, float32 or float64, with le "
-      "(the default) or be behind");
+      "Raw: uint8, int8, uint16, int16, uint32, int32, uint64, int64, float32 or float64, followed by le "
+      "(default) or be");
   command->add_option("--spacing", arguments->spacing,
                       "Raw: A,B,C, the distances of samples in mm (default: 1,1,1)");
   command->add_option("--offset", arguments->offset, "Raw: bytes before the first sample (default: 0)")
       ->check(CLI::Range(std::int64_t{0}, std::int64_t{1'000'000'000'000'000}));
   command
       ->add_option("--replace-nan", arguments->replacement,
-                   "Value in place of samples that are not finite (default: such a volume is refused)")
+                   "Value that replaces samples that are not finite (default: such a volume is refused)")
       ->check(finite_number());
-  command->callback([arguments, &session] {
-    session.command = [arguments, &session] { return run_import(*arguments, session); };
-  });
+  set_work(*command, session, [arguments, &session] { return run_import(*arguments, session); });
 }
 
 }  // namespace hermesh::cli

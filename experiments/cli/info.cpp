@@ -1,21 +1,16 @@
-// hermesh info: what a file holds.
+// hermesh info: prints the contents of a mesh or volume file.
 #include <algorithm>
 #include <iostream>
 #include <memory>
 
 #include "algorithms/core/shown.h"
-#include "algorithms/hermite/hermite_file.h"
 #include "algorithms/io/mesh_file.h"
 #include "algorithms/io/vdb_file.h"
+#include "algorithms/thesis/voxels/hermite_file.h"
 #include "experiments/cli/cli11.h"
-#include "experiments/cli/format.h"
-#include "experiments/cli/pipeline/json_report.h"
-#include "experiments/cli/session.h"
 
 namespace hermesh::cli {
 namespace {
-
-using Json = nlohmann::ordered_json;
 
 std::string index_text(const std::array<int, 3>& index) {
   return "(" + std::to_string(index[0]) + ", " + std::to_string(index[1]) + ", " + std::to_string(index[2]) +
@@ -69,7 +64,7 @@ void print_grid(const GridSummary& grid) {
   const bool cubes = std::max({x, y, z}) - std::min({x, y, z}) < 1e-6 * x;
   std::cout << "  voxel size   " << (cubes ? text(x) : text(Eigen::Vector3d(x, y, z)));
   if (!grid.is_read) {
-    std::cout << "\n  voxels       not read: this program knows no values of this type\n";
+    std::cout << "\n  voxels       not read: values of this type are not supported\n";
     return;
   }
   std::cout << "\n  active       " << grid.active_voxels << " voxels";
@@ -79,7 +74,7 @@ void print_grid(const GridSummary& grid) {
   std::cout << "\n  memory       " << grid.memory_bytes << " bytes\n";
 }
 
-/// Prints what describe_vdb() cannot tell of grids that hold Hermite data.
+/// Prints the properties of Hermite data that describe_vdb() does not report.
 void print_hermite(const std::filesystem::path& path, Session& session) {
   const HermiteSummary hermite = summary_of(read_hermite(path, session.context));
   made(session, "hermite",
@@ -119,7 +114,7 @@ void print_volume(const std::filesystem::path& path, Session& session) {
 }  // namespace
 
 void add_info(CLI::App& app, Session& session) {
-  CLI::App* command = add_command(app, session, "info", "What a mesh or a .vdb file holds");
+  CLI::App* command = add_command(app, session, "info", "Print the contents of a mesh or a .vdb file");
   auto file = std::make_shared<std::string>();
   command
       ->add_option(
@@ -128,18 +123,15 @@ void add_info(CLI::App& app, Session& session) {
       ->required();
   add_files(*command, session, {.inputs = {file.get()}, .in = FileKind::mesh_or_volume});
   add_json_option(*command, session);
-  command->callback([file, &session] {
-    session.command = [file, &session] {
-      const std::filesystem::path path = *file;
-      if (is_mesh_path(path))
-        print_mesh(path, session);
-      else if (path.extension() == ".vdb")
-        print_volume(path, session);
-      else
-        throw Error("cannot tell what '" + *file + "' is: its name ends neither in .vdb nor in " +
-                    kMeshEndings);
-      return kDone;
-    };
+  set_work(*command, session, [file, &session] {
+    const std::filesystem::path path = *file;
+    if (is_mesh_path(path))
+      print_mesh(path, session);
+    else if (path.extension() == ".vdb")
+      print_volume(path, session);
+    else
+      throw Error("unknown format of '" + *file + "': its name ends neither in .vdb nor in " + kMeshEndings);
+    return kDone;
   });
 }
 

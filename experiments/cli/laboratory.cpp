@@ -9,8 +9,8 @@
 #include <memory>
 #include <utility>
 
+#include "experiments/cli/child_run.h"
 #include "experiments/cli/cli11.h"
-#include "experiments/cli/pipeline/child_run.h"
 #include "experiments/cli/session.h"
 
 namespace hermesh::cli {

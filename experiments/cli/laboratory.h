@@ -15,7 +15,7 @@ namespace hermesh::cli {
 struct Session;
 
 /// Returns the directory with experiment files and the laboratory: $HERMESH_EXPERIMENTS, else that of the
-/// source tree which the program was built from. It may not exist.
+/// source tree of the build. It may not exist.
 std::filesystem::path experiments_directory();
 
 /// Adds run, conform, report, claims, compare, accept, merge and benchmark. Their words are passed to the

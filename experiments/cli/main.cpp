@@ -1,39 +1,105 @@
-// The program `hermesh`. What it does on the command line, its exit codes and its output are a contract for
-// scripts: results on stdout, everything else on stderr, a failure is one line there, the last, after the
-// notes.
+// The program `hermesh`. Its commands, exit codes and output are an interface for scripts: results on stdout,
+// everything else on stderr, where a failure is the last line, after the notes.
+#include <fcntl.h>
 #include <tbb/global_control.h>
+#include <unistd.h>
 
 #include <algorithm>
+#include <cerrno>
+#include <cstdio>
+#include <cstring>
+#include <ctime>
 #include <iostream>
 #include <new>
-#include <thread>
 
 #include "algorithms/core/shown.h"
 #include "algorithms/io/mesh_file.h"
+#include "algorithms/thesis/voxels/dense_hermite.h"
 #include "experiments/cli/cli11.h"
-#include "experiments/cli/help/suggestions.h"
+#include "experiments/cli/help.h"
 #include "experiments/cli/laboratory.h"
-#include "experiments/cli/pipeline/batch.h"
-#include "experiments/cli/pipeline/json_report.h"
-#include "experiments/cli/pipeline/log_file.h"
-#include "experiments/cli/pipeline/streams.h"
-#include "experiments/cli/session.h"
 #include "experiments/cli/signals.h"
+#include "experiments/cli/streams.h"
 #include "experiments/cli/terminal_progress.h"
 #include "experiments/provenance.h"
 
 namespace hermesh::cli {
 namespace {
 
-/// Longest error or note, in bytes. What is quoted from files is shorter; the names of files may be long.
+/// Longest error or note, in bytes. Quotations from files are shorter; the names of files may be long.
 constexpr std::size_t kLongest = 1500;
 
-int fail(int exit_code, const std::string& sentence) {
-  // Messages of libraries may hold line breaks, and names of files what controls a terminal; scripts rely on
-  // one line.
-  std::cerr << "hermesh: " << shown(sentence, kLongest, true) << std::endl;
+int fail(int exit_code, const std::string& message) {
+  // Messages of libraries may have line breaks, and names of files control characters; scripts rely on one
+  // line.
+  std::cerr << "hermesh: " << shown(message, kLongest, true) << std::endl;
   return exit_code;
 }
+
+/// Appends a log to a file during its lifetime: the command line, the beginning and end of each stage, notes,
+/// summaries and the end of the run. Each line begins with the time in UTC and is written at once, so that it
+/// survives a killed run.
+class LogFile {
+ public:
+  /// Opens the file and listens to the session. @throws Error if it cannot be written.
+  explicit LogFile(Session& session)
+      : session_(session),
+        file_(open(session.log_file.c_str(), O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0666)) {
+    if (file_ < 0) throw Error("cannot write the log '" + session.log_file + "': " + std::strerror(errno));
+    line("hermesh " + session.version + ": " + session.command_line);
+    session.log = [this](const std::string& text) { line(text); };
+    session.context.on_progress = [this, shown_before = session.context.on_progress](std::string_view stage,
+                                                                                     double fraction) {
+      if (shown_before) shown_before(stage, fraction);
+      const auto& ended = session_.context.stage_seconds;
+      if (fraction >= 1.0 && !ended.empty() && stage.ends_with(ended.back().first)) {
+        line("end of stage '" + std::string(stage) + "', " + seconds_text(ended.back().second));
+        stage_.clear();
+      } else if (stage != stage_) {
+        stage_ = stage;
+        line("stage '" + stage_ + "'");
+      }
+    };
+  }
+  ~LogFile() {
+    add_notes();
+    session_.log = nullptr;
+    session_.context.on_progress = nullptr;
+    close(file_);
+  }
+  LogFile(const LogFile&) = delete;
+  LogFile& operator=(const LogFile&) = delete;
+
+  /// Appends the new notes and a line.
+  void line(const std::string& text) {
+    add_notes();
+    write_line(text);
+  }
+
+ private:
+  void add_notes() {
+    for (; notes_ < session_.context.notes.size(); ++notes_)
+      write_line("note: " + session_.context.notes[notes_]);
+  }
+  void write_line(const std::string& text) {
+    const auto now = std::chrono::system_clock::now().time_since_epoch();
+    const std::time_t seconds = std::chrono::duration_cast<std::chrono::seconds>(now).count();
+    const auto milliseconds = std::chrono::duration_cast<std::chrono::milliseconds>(now).count() % 1000;
+    std::tm parts = {};
+    gmtime_r(&seconds, &parts);
+    char date[32], end[16];
+    std::strftime(date, sizeof date, "%Y-%m-%dT%H:%M:%S", &parts);
+    std::snprintf(end, sizeof end, ".%03dZ ", int(milliseconds));
+    const std::string all = date + (end + shown(session_.named(text), 4000, true)) + "\n";
+    // A log that cannot be written must not end the work; the next line is tried again.
+    [[maybe_unused]] const ssize_t written = write(file_, all.data(), all.size());
+  }
+
+  Session& session_;
+  int file_;
+  std::size_t notes_ = 0;  ///< number of notes in the file
+  std::string stage_;
+};
 
 void print_notes(Session& session) {
   if (!session.quiet)
@@ -42,7 +108,7 @@ void print_notes(Session& session) {
   session.context.notes.clear();
 }
 
-/// Runs the command on the files that were named, or on standard streams.
+/// Runs the command on its files or on standard streams.
 int run_on_files(Session& session, CommandFiles* files) {
   std::optional<Streams> streams;
   if (files) streams.emplace(*files, session);
@@ -51,7 +117,7 @@ int run_on_files(Session& session, CommandFiles* files) {
   return exit_code;
 }
 
-/// The command by the name that plan_of() knows it by. How many tries a budget takes is unknown, so it has no
+/// Returns the name of the command for plan_of(). A budget takes an unknown number of attempts and has no
 /// plan.
 std::string planned_command(const Session& session) {
   for (const std::string option : {" --error", " --triangles"})
@@ -59,15 +125,15 @@ std::string planned_command(const Session& session) {
   return session.command_name;
 }
 
-/// Runs the command, shows and logs how it gets on, and tells in JSON what came of it, if asked.
+/// Runs the command, shows and logs its progress, and writes its JSON if requested.
 int run_command(Session& session, CommandFiles* files) {
-  // A batch counts its files, which is all of its progress.
+  // The progress of a batch is the share of its files.
   const bool batch = session.writes_json_itself;
   const TerminalProgress progress(
       session.context, !session.quiet,
       batch ? std::vector<PlannedStage>{{"", 1.0}} : plan_of(planned_command(session)));
   std::optional<LogFile> log;
-  if (!session.log_file.empty()) log.emplace(session, session.log_file, session.command_line);
+  if (!session.log_file.empty()) log.emplace(session);
   int exit_code = kFailed;
   try {
     exit_code = run_on_files(session, files);
@@ -84,7 +150,7 @@ int run_command(Session& session, CommandFiles* files) {
   return exit_code;
 }
 
-/// Exit code and sentence of what ended the command.
+/// Returns the exit code and the message for an exception that ended the command.
 std::pair<int, std::string> failure(const std::exception& error, const Session& session) {
   if (dynamic_cast<const UsageError*>(&error)) return {kUsage, session.named(error.what())};
   if (dynamic_cast<const std::bad_alloc*>(&error))
@@ -92,28 +158,27 @@ std::pair<int, std::string> failure(const std::exception& error, const Session& 
   return {kFailed, session.named(error.what())};
 }
 
-/// Turns whatever ends the command into an exit code and at most one line.
+/// Runs the command; returns the exit code, and prints the message of a failure.
 int run_to_exit_code(Session& session, CommandFiles* files) {
   try {
     return run_command(session, files);
   } catch (const std::exception& error) {
-    // Whatever a library throws while the user is waiting for the end, it ends because the user said so.
+    // After a signal any exception of a library ends the run on the user's request.
     if (const int exit_code = signal_exit_code()) end_process(exit_code);
-    const auto [exit_code, sentence] = failure(error, session);
-    // Who reads JSON gets the failure in it, too. What cannot be written then has been complained of by the
-    // failure.
+    const auto [exit_code, message] = failure(error, session);
+    // The JSON has the failure, too. If it cannot be written, the message of the failure suffices.
     try {
-      if (!session.writes_json_itself) write_json_report(session, exit_code, sentence);
+      if (!session.writes_json_itself) write_json_report(session, exit_code, message);
       std::cout.flush();
     } catch (const std::exception&) {
     }
     print_notes(session);
-    return fail(exit_code, sentence);
+    return fail(exit_code, message);
   }
 }
 
-/// Name of an option whose value is an empty string, as a variable of a script that was not set leaves it; it
-/// would be taken for one that was not given. Empty if there is no such option.
+/// Returns the name of an option whose value is an empty string, as an unset variable of a script leaves it;
+/// it would be taken for a missing option. Empty if there is no such option.
 std::string option_without_value(const CLI::App& app) {
   for (const CLI::Option* option : app.get_options())
     for (const std::string& given : option->results())
@@ -124,30 +189,28 @@ std::string option_without_value(const CLI::App& app) {
   return {};
 }
 
-/// A sentence about a word behind --json that is meant as its file but would be taken for an input, for want
-/// of an ending by which it is told; empty if there is none.
+/// Returns a message about a word after --json that is meant as its file but would be an input because of its
+/// ending; empty if there is none.
 std::string misnamed_json_file(const std::vector<std::string>& words) {
   const auto at = std::ranges::find(words, "--json");
   if (at == words.end() || at + 1 == words.end()) return {};
   const std::filesystem::path word = *(at + 1);
   const std::string ending = word.extension().string();
   if (word.string().starts_with('-') || ending.empty() || is_mesh_path(word)) return {};
-  // No command reads or makes what ends like this; and what is not there can be no input of any kind, but an
-  // output of ours.
+  // No command reads or writes files with these endings; a file that does not exist is not an input, but may
+  // be an output.
   const bool is_report = ending == ".txt" || ending == ".log" || ending == ".csv";
   const auto endings = {".json", ".jsonl", ".vdb", ".nii", ".raw", ".gz", ".toml"};
   const bool is_ours = std::ranges::find(endings, ending) != endings.end();
   std::error_code error;
   if (is_ours || (!is_report && std::filesystem::exists(word, error))) return {};
-  return "--json takes the next word for its file where that ends in .json or .jsonl, and '" + word.string() +
-         "' would be an input: write --json='" + word.string() + "' if it is the file";
+  return "--json takes the next word as its file only if that ends in .json or .jsonl, and '" +
+         word.string() + "' would be an input: write --json='" + word.string() + "' if it is the file";
 }
 
-/// The arguments in the order in which CLI11 takes them, the last one first. The file of --json is tied to
-/// it, for a flag takes no value of its own accord; no file that a command reads or makes ends as that one
-/// does.
-std::vector<std::string> with_json_files(int argc, char** argv) {
-  std::vector<std::string> words(argv + 1, argv + argc);
+/// Returns the arguments in the order that CLI11 expects, the last one first. The file of --json is attached
+/// to it, because a flag takes no separate value; no file that a command reads or writes has that ending.
+std::vector<std::string> with_json_files(std::vector<std::string> words) {
   for (std::size_t i = 0; i + 1 < words.size(); ++i)
     if (words[i] == "--json" && (words[i + 1].ends_with(".json") || words[i + 1].ends_with(".jsonl"))) {
       words[i] += "=" + words[i + 1];
@@ -160,10 +223,10 @@ int run_program(int argc, char** argv) {
   Session session;
   session.context.cancel = &handle_signals();
   session.version = HERMESH_VERSION;
-  CLI::App app("Converts polygons to sparse volumes and back, and judges the meshes.", "hermesh");
+  CLI::App app("Converts polygons to sparse volumes and back, and validates meshes.", "hermesh");
   app.set_version_flag(
       "--version", [] { return "hermesh " HERMESH_VERSION "\n" + build_text(); },
-      "Print the version, and what the program was built from and with, and exit");
+      "Print the version and the build facts, and exit");
   app.set_help_flag("--help,-h", "Print this help and exit");
   add_common_options(app, session);
   add_list(app, session);
@@ -176,39 +239,39 @@ int run_program(int argc, char** argv) {
   add_info(app, session);
   add_laboratory(app, session);
   add_help(app, session);
-  if (const std::string sentence = misnamed_json_file({argv + 1, argv + argc}); !sentence.empty())
-    return fail(kUsage, sentence + "; see hermesh --help");
-  for (int i = 1; i < argc; ++i) session.command_line += (i > 1 ? " " : "") + std::string(argv[i]);
+  const auto refuse = [](const std::string& message) {
+    return fail(kUsage, message + "; see hermesh --help");
+  };
+  const std::vector<std::string> words(argv + 1, argv + argc);
+  if (const std::string message = misnamed_json_file(words); !message.empty()) return refuse(message);
+  for (const std::string& word : words)
+    session.command_line += (session.command_line.empty() ? "" : " ") + word;
+  CommandFiles* files = nullptr;
   try {
-    app.parse(with_json_files(argc, argv));
+    app.parse(with_json_files(words));
+    if (const std::string option = option_without_value(app); !option.empty())
+      return refuse(option + " was given an empty value");
+    if (!session.command) return refuse("a command is missing");
+    files = files_of_command(app, session);
+    check_written_files(app, files, session);
   } catch (const CLI::ParseError& error) {
     if (error.get_exit_code() == 0) return app.exit(error);
-    std::string sentence = unknown_word(app, {argv + 1, argv + argc});
-    if (sentence.empty() && dynamic_cast<const CLI::RequiredError*>(&error))
-      sentence = missing_output(app, session);
-    return fail(kUsage, (sentence.empty() ? error.what() : sentence) + "; see hermesh --help");
-  } catch (const UsageError& error) {  // what a command sees while it reads its options
-    return fail(kUsage, std::string(error.what()) + "; see hermesh --help");
+    std::string message = unknown_word(app, words);
+    if (message.empty() && dynamic_cast<const CLI::RequiredError*>(&error))
+      message = missing_output(app, session);
+    return refuse(message.empty() ? error.what() : message);
+  } catch (const UsageError& error) {
+    return refuse(error.what());
   }
-  if (const std::string option = option_without_value(app); !option.empty())
-    return fail(kUsage, option + " was given an empty value; see hermesh --help");
-  if (!session.command) return fail(kUsage, "say what to do: a command is missing; see hermesh --help");
 
-  // Where nobody says how many, TBB takes as many as the machine has, and an experiment may ask for more.
+  // Without a limit TBB uses the whole machine, and an experiment may request more.
   std::optional<tbb::global_control> limit;
   if (session.threads)
     limit.emplace(tbb::global_control::max_allowed_parallelism, static_cast<std::size_t>(*session.threads));
-  CommandFiles* files = nullptr;
-  try {
-    files = files_of_command(app, session);
-    check_written_files(app, files, session);
-  } catch (const UsageError& error) {
-    return fail(kUsage, std::string(error.what()) + "; see hermesh --help");
-  }
-  session.report = std::make_shared<JsonReport>();
-  // A flag without a value is "true".
+  // The value of a flag without one is "true".
   session.json = session.json_file == "true";
   if (session.json) session.json_file.clear();
+  session.start = std::chrono::steady_clock::now();
   const int exit_code = run_to_exit_code(session, files);
   work_is_finished();
   print_notes(session);
@@ -219,14 +282,15 @@ int run_program(int argc, char** argv) {
 }  // namespace hermesh::cli
 
 int main(int argc, char** argv) {
-  // What runs before this is compiled for x86-64-v2, too, but is not likely to need it.
+  // Static initialisers are compiled for x86-64-v2, too, but are unlikely to need it.
   if (!__builtin_cpu_supports("sse4.2") || !__builtin_cpu_supports("popcnt"))
     return hermesh::cli::fail(
         hermesh::cli::kFailed,
         "this processor lacks SSE4.2 or POPCNT (x86-64-v2), which the program needs; if this is a "
-        "virtual machine, let it show the host's processor");
+        "virtual machine, let it expose the host's processor");
   hermesh::cli::occupy_closed_streams();
   try {
+    hermesh::register_dense_grids();
     return hermesh::cli::run_program(argc, argv);
   } catch (const std::exception& error) {
     return hermesh::cli::fail(hermesh::cli::kFailed, error.what());

@@ -7,6 +7,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdlib>
 #include <fstream>
@@ -60,12 +61,12 @@ ProgramTest::~ProgramTest() {
   std::filesystem::remove_all(streams_);
 }
 
-void ProgramTest::execute(std::vector<std::string> words, int err) const {
+void ProgramTest::execute(Words words, int err) const {
   words.insert(words.begin(), HERMESH_PROGRAM);
   become(std::move(words), err);
 }
 
-void ProgramTest::become(std::vector<std::string> words, int err) const {
+void ProgramTest::become(Words words, int err) const {
   std::vector<char*> argv;
   for (std::string& word : words) argv.push_back(word.data());
   argv.push_back(nullptr);
@@ -78,13 +79,12 @@ void ProgramTest::become(std::vector<std::string> words, int err) const {
     if (setrlimit(static_cast<__rlimit_resource_t>(resource), &limit) != 0) _exit(126);
   }
   for (const int number : {SIGHUP, SIGPIPE, SIGXCPU})
-    ::signal(number, SIG_DFL);  // whoever runs the test may ignore them
+    ::signal(number, SIG_DFL);  // the caller of the test may ignore them
   execv(argv[0], argv.data());
   _exit(127);
 }
 
-Outcome ProgramTest::run(const std::vector<std::string>& arguments,
-                         std::optional<Interruption> interruption) {
+Outcome ProgramTest::run(const Words& arguments, std::optional<Interruption> interruption) {
   const pid_t child = fork();
   if (child == 0) execute(arguments, open_or_exit(streams_ / "err", O_WRONLY | O_CREAT | O_TRUNC));
   if (interruption) {
@@ -93,6 +93,29 @@ Outcome ProgramTest::run(const std::vector<std::string>& arguments,
     kill(child, interruption->signal);
   }
   return outcome_of(child);
+}
+
+Outcome ProgramTest::run_to(int exit_code, const Words& arguments, std::optional<Interruption> interruption) {
+  std::string command = "hermesh";
+  for (const std::string& argument : arguments) command += " " + argument;
+  Outcome outcome = run(arguments, interruption);
+  EXPECT_EQ(outcome.exit_code, exit_code) << command.substr(0, 200) << '\n' << outcome.out << outcome.err;
+  return outcome;
+}
+
+void ProgramTest::expect_refusal(int exit_code, const Words& arguments, const Words& words,
+                                 bool notes_allowed, std::size_t longest) {
+  const std::set<std::string> before = files();
+  const std::string err = run_to(exit_code, arguments).err;
+  const std::size_t line = err.rfind("hermesh: ");
+  ASSERT_NE(line, std::string::npos) << err;
+  EXPECT_TRUE(line == 0 || (notes_allowed && err[line - 1] == '\n')) << err;
+  EXPECT_EQ(count(err.substr(line), "\n"), 1u) << err;
+  EXPECT_LE(err.size() - line, longest) << err;
+  EXPECT_TRUE(
+      std::ranges::none_of(err, [](unsigned char c) { return (c < 0x20 && c != '\n') || c == 0x7f; }));
+  for (const std::string& word : words) EXPECT_PRED2(has, err, word);
+  EXPECT_EQ(files(), before);
 }
 
 Outcome ProgramTest::run_shell(const std::string& script) {
@@ -113,7 +136,7 @@ Outcome ProgramTest::outcome_of(int child) const {
           content_of(streams_ / "err"), elapsed.count()};
 }
 
-std::string ProgramTest::terminal_output(const std::vector<std::string>& arguments) {
+std::string ProgramTest::terminal_output(const Words& arguments) {
   int terminal = -1, end_of_program = -1;
   if (openpty(&terminal, &end_of_program, nullptr, nullptr, nullptr) != 0)
     throw std::runtime_error("cannot open a terminal");

@@ -1,34 +1,34 @@
-// What all commands of the program share.
+// State of one run of the program, and the functions that all commands share.
 #pragma once
 
+#include <chrono>
 #include <functional>
 #include <initializer_list>
 #include <map>
-#include <memory>
+#include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "algorithms/core/error.h"
+#include "algorithms/core/number_text.h"
 #include "algorithms/core/run_context.h"
-#include "experiments/cli/pipeline/command_files.h"
-
-namespace CLI {
-class App;
-}
+#include "experiments/cli/files.h"
 
 namespace hermesh::cli {
 
-/// Exit codes of the program. 130 and 143 (128 + the signal's number) stand for a cancelled run.
+using Json = nlohmann::ordered_json;
+
+/// Exit codes of the program; 128 plus the number of a signal if the signal ended it.
 enum ExitCode { kDone = 0, kFailed = 1, kUsage = 2, kNotMet = 3 };
 
-/// A command line that asks for something that does not exist or cannot be: exit code 2.
+/// A command line that asks for something that does not exist or is impossible: exit code 2.
 class UsageError : public Error {
   using Error::Error;
 };
 
-/// Runs `check`, whose errors are the user's choice of words (the name of a variant, the value of an option),
-/// so that they count as usage.
+/// Runs `check`, whose errors are about words of the command line, and rethrows these as UsageError.
 template <typename Check>
 auto as_usage(Check check) {
   try {
@@ -38,33 +38,51 @@ auto as_usage(Check check) {
   }
 }
 
-struct JsonReport;  // pipeline/json_report.h
-
 struct Session {
   RunContext context;
   bool quiet = false;
-  bool json = false;           ///< prints what was done as one JSON object instead of summaries
-  std::string json_file;       ///< file that such an object is written to; empty: none
-  std::optional<int> threads;  ///< number of threads; none: as many as the machine has
-  std::string log_file;        ///< empty: no log is kept
-  std::function<void(const std::string&)> log;  ///< adds a line to the log; empty where none is kept
-  std::function<int()> command;                 ///< runs the command that was asked for; returns an ExitCode
+  bool json = false;                            ///< prints one JSON object in place of summaries
+  std::string json_file;                        ///< file for that object; empty: none
+  std::optional<int> threads;                   ///< number of threads; none: all of the machine
+  std::string log_file;                         ///< empty: no log
+  std::function<void(const std::string&)> log;  ///< appends a line to the log; empty without a log
+  std::function<int()> command;                 ///< runs the requested command; returns an ExitCode
 
   std::map<const CLI::App*, CommandFiles> files;  ///< of the commands that work on files
   std::string command_name, command_line, version;
-  double scale = 1.0;  ///< world units in one unit of the numbers of a mesh file that is read
-  std::string units;   ///< of the numbers of a mesh file, where the world is in metres; empty: not given
-  std::vector<std::string> inputs;  ///< as the user named them; empty: the command has none
-  std::string output;               ///< as the user named it; empty: there is none
-  bool writes_json_itself = false;  ///< whether the command prints its JSON, as a batch does line by line
-  bool writes_stream = false;       ///< whether the output is the standard output
-  /// Names of temporary files, and what sentences call these.
+  double scale = 1.0;               ///< world units per unit of the coordinates in an input mesh file
+  std::string units;                ///< of these coordinates if the world is in metres; empty: not given
+  std::vector<std::string> inputs;  ///< as the user named them
+  std::string output;               ///< as the user named it; empty: none
+  bool writes_json_itself = false;  ///< true if the command prints its own JSON, as a batch does line by line
+  bool writes_stream = false;       ///< true if the output is the standard output
+  /// Names of temporary files, and their names in messages.
   std::vector<std::pair<std::string, std::string>> stream_names;
-  std::shared_ptr<JsonReport> report;  ///< what goes into the JSON; null until the command runs
 
-  /// The sentence with the standard streams by their names in place of those of temporary files.
-  std::string named(std::string sentence) const;
+  Json result = Json::object();                      ///< key `result` of the JSON object
+  nlohmann::json beside = nlohmann::json::object();  ///< keys next to the common ones
+  std::chrono::steady_clock::time_point start = std::chrono::steady_clock::now();
+
+  /// Returns the message with the names of temporary files replaced by those of the standard streams.
+  std::string named(std::string message) const;
 };
+
+/// Sets a key of `result` in the JSON object of the run.
+inline void made(Session& session, const std::string& key, const Json& value) { session.result[key] = value; }
+
+/// Prints a line of summary, unless the session is quiet or prints JSON, and logs it.
+void print_summary(const Session& session, const std::string& line);
+
+std::string seconds_text(double seconds);  ///< "1.234 s"
+
+/// Returns JSON text of the value with a line break at its end; bytes that are not UTF-8 become question
+/// marks. An `indent` of −1 writes one line.
+std::string json_text(const Json& value, int indent);
+
+/// Writes the JSON object of the run (pipeline.md lists its keys) if one was requested; `error` is empty
+/// after success.
+/// @throws Error if the file cannot be written.
+void write_json_report(const Session& session, int exit_code, const std::string& error);
 
 // Each adds its commands, which set session.command when they are parsed.
 void add_list(CLI::App& app, Session& session);
@@ -77,22 +95,16 @@ void add_validate(CLI::App& app, Session& session);
 void add_info(CLI::App& app, Session& session);
 void add_help(CLI::App& app, Session& session);  ///< adds doctor, completion and man
 
-/// Registers the files of a command, for standard streams, batches and JSON. The variables must live as long
-/// as it does. Also adds the options that name the formats of standard streams, and, if the command takes
-/// many inputs, those of a batch.
-void add_files(CLI::App& command, Session& session, CommandFiles files);
-
-/// Lets a command print what it did as JSON (pipeline/json_report.h), or write that to a file.
-void add_json_option(CLI::App& command, Session& session);
-
-/// Refuses the options that were given though nothing would look at them. @throws UsageError that ends with
-/// `why`.
-void refuse_idle(const CLI::App& command, std::initializer_list<const char*> options, const std::string& why);
-
 /// Adds the options that the program and all of its commands take.
 void add_common_options(CLI::App& app, Session& session);
 
-/// Adds a subcommand with the options that all subcommands take, and returns it.
+/// Adds a command with the options that all commands take, and returns it.
 CLI::App* add_command(CLI::App& app, Session& session, const std::string& name, const std::string& summary);
+
+/// Adds --json, which prints or writes the JSON object of the run.
+void add_json_option(CLI::App& command, Session& session);
+
+/// Refuses options that were given and that have no effect. @throws UsageError that ends with `why`.
+void refuse_idle(const CLI::App& command, std::initializer_list<const char*> options, const std::string& why);
 
 }  // namespace hermesh::cli

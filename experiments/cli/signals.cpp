@@ -42,10 +42,9 @@ extern "C" void on_signal(int number) {
   errno = saved_errno;
 }
 
-/// Starts a process that shares this one's memory and files and outlives it. To take back gigabytes, and a
-/// large file that is removed while it is open, costs the system some tenths of a second; now they are taken
-/// back from the other process, and whoever waits for this one need not wait for that. (Pipes stay open until
-/// then.)
+/// Starts a process that shares this one's memory and files and outlives it. The system needs some tenths of
+/// a second to free gigabytes, and a large file that was removed while it was open; it now does so after the
+/// end of this process, for which the user waits. (Pipes stay open until then.)
 void leave_memory_to_another_process() {
   constexpr std::size_t kStack = 16384;
   alignas(16) static char stack[kStack];
@@ -88,7 +87,7 @@ const std::atomic<bool>& handle_signals() {
     sigaction(number, nullptr, &before);
     if (before.sa_handler != SIG_IGN) sigaction(number, &action, nullptr);
   }
-  // A write beyond the limit of a file's size then fails as one to a full disk does.
+  // A write beyond the limit of the file size then fails like a write to a full disk.
   std::signal(SIGXFSZ, SIG_IGN);
   return cancel_flag;
 }

@@ -1,70 +1,156 @@
-// hermesh validate: the judges' report of one mesh.
+// hermesh validate: the validation report of a mesh.
 #include <algorithm>
 #include <iostream>
 #include <memory>
-#include <optional>
 #include <sstream>
 
 #include "experiments/cli/cli11.h"
-#include "experiments/cli/pipeline/json_report.h"
-#include "experiments/cli/report_text.h"
-#include "experiments/cli/session.h"
-#include "experiments/cli/validators.h"
-#include "experiments/cli/voxelizing.h"
+#include "experiments/cli/conversions.h"
 #include "validation/mesh_report.h"
+#include "validation/report_json.h"
 
 namespace hermesh::cli {
 namespace {
 
-using validation::JudgeOptions;
+using validation::CheckOptions;
 using validation::MeshReport;
 
 struct ValidateArguments {
   std::string mesh, reference, features, reference_quads = "better";
   std::string require;
-  bool certify = false;
-  std::int64_t samples = JudgeOptions().samples, solid_samples = JudgeOptions().solid_samples;
-  double dihedral = JudgeOptions().dihedral_degrees, voxel_size = 0.0;
+  CheckOptions options = {};
 };
 
-bool same_solid(const MeshReport& r) {
-  return r.solid && r.solid->verdict == validation::SolidComparison::Verdict::same;
-}
-bool other_solid(const MeshReport& r) {
-  return r.solid && r.solid->verdict == validation::SolidComparison::Verdict::differs;
+// ---- The report as text.
+
+void print(const std::string& name, const std::string& value) {
+  constexpr std::size_t kNameWidth = 24;
+  std::cout << name << std::string(name.size() < kNameWidth ? kNameWidth - name.size() : 1, ' ') << value
+            << '\n';
 }
 
+void print_count(const std::string& name, std::int64_t value) { print(name, std::to_string(value)); }
+
+/// Prints the number of defects of a kind and the locations of the first ones.
+void print_defects(const std::string& name, std::int64_t count, const validation::Places& places) {
+  print_count(name, count);
+  for (std::size_t i = 0; i < places.points.size(); ++i) {
+    std::string where = "at " + text(places.points[i]);
+    if (i < places.polygons.size() && places.polygons[i][0] >= 0) {
+      const auto& [first, second] = places.polygons[i];
+      where += second < 0 ? ", polygon " + std::to_string(first)
+                          : ", polygons " + std::to_string(first) + " and " + std::to_string(second);
+    }
+    print("", where);
+  }
+}
+
+void print_counts(const MeshReport& report) {
+  print_count("points", report.points);
+  print_count("triangles", report.triangles);
+  print_count("quads", report.quads);
+  print_defects("boundary edges", report.boundary_edges, report.boundary_places);
+  print_defects("non-manifold edges", report.non_manifold_edges, report.non_manifold_edge_places);
+  print_defects("non-manifold vertices", report.non_manifold_vertices, report.non_manifold_vertex_places);
+  print_defects("inconsistent edges", report.inconsistent_edges, report.inconsistent_places);
+  if (report.inside_out_components)
+    print_defects("components inside out", *report.inside_out_components, report.inside_out_places);
+  print_defects("degenerate polygons", report.degenerate_polygons, report.degenerate_places);
+  print_defects("duplicate polygons", report.duplicate_polygons, report.duplicate_places);
+  print_count("isolated points", report.isolated_points);
+  print_count("components", report.components);
+  print_count("Euler characteristic", report.euler_characteristic);
+  print("genus", report.genus ? text(*report.genus) : "none: not closed, manifold and oriented");
+  if (const auto& pairs = report.self_intersections) {
+    print_defects("intersecting pairs", pairs->pairs, pairs->places);
+    if (pairs->pairs > 0)
+      print("", std::to_string(pairs->disjoint) + " apart, " + std::to_string(pairs->vertex_sharing) +
+                    " sharing a vertex, " + std::to_string(pairs->edge_sharing) + " sharing an edge");
+  }
+}
+
+std::string estimate_text(const validation::Estimate& e) {
+  return text(e.value) + ", between " + text(e.lower) + " and " + text(e.upper);
+}
+
+void print_solid(const validation::SolidComparison& solid) {
+  print("symmetric difference", estimate_text(solid.difference));
+  print("", "of it unexplained by a distance of " + text(solid.explained) + ": " +
+                estimate_text(solid.unexplained));
+  print("reference's solid", "volume " + estimate_text(solid.reference_volume));
+  print("", "unknown volume " + estimate_text(solid.unknown_volume));
+  print("", "outer boundary of area " + text(solid.reference_area) +
+                (solid.possible_area > 0.0 ? " and perhaps " + text(solid.possible_area) : "") + " in " +
+                std::to_string(solid.reference_components) + " components; the mesh: " +
+                text(solid.mesh_area) + " in " + std::to_string(solid.mesh_components));
+  print("wrong area of the mesh", estimate_text(solid.false_area));
+  print("lost area", estimate_text(solid.lost_area));
+}
+
+std::string distances_text(const validation::Distances& distances) {
+  return "max " + text(distances.max) + " at " + text(distances.worst) + ", mean " + text(distances.mean) +
+         ", rms " + text(distances.rms) + ", " + std::to_string(distances.samples) + " samples";
+}
+
+void print_distances(const std::string& name, const std::optional<validation::Distances>& distances,
+                     const std::optional<validation::HausdorffBound>& bound) {
+  if (distances) print(name, distances_text(*distances));
+  if (bound) print("", "from " + text(bound->lower) + " to " + text(bound->upper) + ", certified");
+}
+
+void print_measures(const MeshReport& report) {
+  print("volume", text(report.volume));
+  print("area", text(report.area));
+  print("smallest angle", text(report.smallest_angle) + " degrees");
+  print("worst aspect ratio", text(report.worst_aspect));
+  print_distances("to the reference", report.to_reference, report.certified_to_reference);
+  print_distances("from the reference", report.from_reference, report.certified_from_reference);
+  if (report.solid) print_solid(*report.solid);
+  if (const auto& features = report.features) {
+    print("sharp edges", std::to_string(features->edges) + " of length " + text(features->edge_length) +
+                             "; " + std::to_string(features->edges_excluded) +
+                             " left out, part of a smooth blend");
+    print("", distances_text(features->edge_to_mesh));
+    print_count("sharp corners", features->corners);
+    print("", distances_text(features->corner_to_mesh));
+  }
+  for (const validation::LibraryCounts& library : report.libraries) {
+    print(library.library, !library.loaded                 ? "cannot load the mesh: " + library.refusal
+                           : library.disagreements.empty() ? "agrees"
+                                                           : "disagrees");
+    for (const std::string& disagreement : library.disagreements) print("", disagreement);
+  }
+}
+
+// ---- Requirements.
+
 using Requirement = std::pair<std::string, bool (*)(const MeshReport&)>;
+using Verdict = validation::SolidComparison::Verdict;
 
 const Requirement kRequirements[] = {
     {"closed", [](const MeshReport& r) { return r.closed(); }},
     {"manifold", [](const MeshReport& r) { return r.manifold(); }},
     {"oriented", [](const MeshReport& r) { return r.oriented(); }},
     {"watertight", [](const MeshReport& r) { return r.watertight(); }},
-    {"solid", same_solid},
+    {"solid", [](const MeshReport& r) { return r.solid && r.solid->verdict == Verdict::same; }},
     {"no-self-intersection",
      [](const MeshReport& r) { return r.self_intersections && r.self_intersections->pairs == 0; }},
 };
 
-const Requirement& find_requirement(const std::string& name) {
-  std::string names;
-  for (const Requirement& requirement : kRequirements) {
-    if (requirement.first == name) return requirement;
-    names += (names.empty() ? "" : ", ") + requirement.first;
-  }
-  throw UsageError("--require knows no '" + name + "', only " + names);
-}
-
-/// The requirements named in a comma-separated list.
+/// Returns the requirements named in a comma-separated list. @throws UsageError for an unknown name.
 std::vector<Requirement> parse_requirements(const std::string& list) {
   std::vector<Requirement> requirements;
-  std::istringstream names(list);
-  for (std::string name; std::getline(names, name, ',');) requirements.push_back(find_requirement(name));
+  std::istringstream stream(list);
+  for (std::string name; std::getline(stream, name, ',');) {
+    const auto found = std::ranges::find(kRequirements, name, &Requirement::first);
+    if (found == std::end(kRequirements)) {
+      std::string names;
+      for (const auto& [known, holds] : kRequirements) names += (names.empty() ? "" : ", ") + known;
+      throw UsageError("--require has no '" + name + "', only " + names);
+    }
+    requirements.push_back(*found);
+  }
   return requirements;
-}
-
-bool names(const std::vector<Requirement>& requirements, const std::string& name) {
-  return std::ranges::any_of(requirements, [&](const Requirement& r) { return r.first == name; });
 }
 
 std::optional<MeshFile> read_if_named(const std::string& file, RunContext& context) {
@@ -74,45 +160,50 @@ std::optional<MeshFile> read_if_named(const std::string& file, RunContext& conte
 
 int run_validate(const ValidateArguments& arguments, const CLI::App& command, Session& session) {
   const std::vector<Requirement> requirements = parse_requirements(arguments.require);
-  if (arguments.certify && arguments.reference.empty())
-    throw UsageError("--certify bounds the distance to a reference: name it with --reference");
-  const bool watertight = names(requirements, "watertight"), solid = names(requirements, "solid");
-  if (solid && arguments.reference.empty())
-    throw UsageError("--require solid compares the mesh with a reference: name it with --reference");
-  if (arguments.voxel_size > 0.0 && arguments.reference.empty())
-    throw UsageError("--voxel-size says what explains a distance to a reference: name it with --reference");
-  if (arguments.reference.empty() && arguments.features.empty())
-    refuse_idle(command, {"--samples"}, "distances need a --reference");
-  if (solid && arguments.solid_samples == 0) throw UsageError("--require solid needs --solid-samples");
-  if (arguments.reference.empty())
-    refuse_idle(command, {"--reference-quads", "--solid-samples"}, "it is about a --reference");
+  const auto required = [&](const char* name) {
+    return std::ranges::find(requirements, name, &Requirement::first) != requirements.end();
+  };
+  CheckOptions options = arguments.options;
+  if (arguments.reference.empty()) {
+    if (options.certify) throw UsageError("--certify bounds the distance to a reference: pass --reference");
+    if (required("solid"))
+      throw UsageError("--require solid compares the mesh with a reference: pass --reference");
+    refuse_idle(command, {"--voxel-size", "--reference-quads", "--solid-samples"}, "it needs --reference");
+    if (arguments.features.empty()) refuse_idle(command, {"--samples"}, "distances need a --reference");
+  }
+  if (required("solid") && options.solid_samples == 0)
+    throw UsageError("--require solid needs --solid-samples");
   if (arguments.features.empty()) refuse_idle(command, {"--dihedral"}, "sharp edges are those of --features");
 
   const MeshFile mesh = read_mesh_file(arguments.mesh, session.context);
   const auto reference = read_if_named(arguments.reference, session.context);
   const auto features = read_if_named(arguments.features, session.context);
-  JudgeOptions options;
   options.reference = reference ? &*reference : nullptr;
-  if (arguments.reference_quads == "as-given") options.reference_quads = validation::QuadRule::as_given;
   options.features = features ? &*features : nullptr;
-  options.samples = arguments.samples;
-  options.solid_samples = arguments.solid_samples;
-  options.certify = arguments.certify;
-  options.dihedral_degrees = arguments.dihedral;
-  options.voxel_size = arguments.voxel_size;
-  const MeshReport report = validation::judge(mesh, options, session.context);
+  if (arguments.reference_quads == "as-given") options.reference_quads = validation::QuadRule::as_given;
+  const MeshReport report = validation::check_mesh(mesh, options, session.context);
 
   std::vector<std::string> unmet;
-  for (const Requirement& requirement : requirements)
-    if (!requirement.second(report)) unmet.push_back(requirement.first);
-  // A watertight surface about something else is not what was meant by naming a reference. Where nobody can
-  // tell what the reference encloses, only who asks for the solid asks too much.
-  if (watertight && !solid && other_solid(report)) unmet.push_back("solid");
-  const std::string name = session.inputs[0];
-  session.report->beside = report_json(report, name, unmet);
+  for (const auto& [name, holds] : requirements)
+    if (!holds(report)) unmet.push_back(name);
+  // With a reference a watertight surface must not bound another solid. An unknown solid of the reference
+  // fails only the requirement `solid`.
+  if (required("watertight") && !required("solid") && report.solid &&
+      report.solid->verdict == Verdict::differs)
+    unmet.push_back("solid");
+  session.beside = validation::to_json(report);
+  session.beside["mesh"] = session.inputs[0];
+  session.beside["unmet_requirements"] = unmet;
   made(session, "sentences", report.sentences());
   made(session, "unmet_requirements", unmet);
-  if (!session.json) std::cout << report_text(report, session.named(arguments.mesh), unmet);
+  if (!session.json) {
+    print("mesh", session.named(arguments.mesh));
+    print_counts(report);
+    print_measures(report);
+    std::cout << '\n';
+    for (const std::string& sentence : report.sentences()) std::cout << sentence << '\n';
+    for (const std::string& name : unmet) std::cout << "Required but not met: " << name << ".\n";
+  }
   return unmet.empty() ? kDone : kNotMet;
 }
 
@@ -120,54 +211,52 @@ int run_validate(const ValidateArguments& arguments, const CLI::App& command, Se
 
 void add_validate(CLI::App& app, Session& session) {
   CLI::App* command =
-      add_command(app, session, "validate", "Judge a mesh: topology, self-intersections, distances");
+      add_command(app, session, "validate", "Validate a mesh: topology, self-intersections, distances");
   auto arguments = std::make_shared<ValidateArguments>();
+  CheckOptions& options = arguments->options;
   command->add_option("MESH", arguments->mesh, kMeshIn)->required();
   add_files(*command, session, {.inputs = {&arguments->mesh}, .takes_many = true});
-  command->add_option("--reference", arguments->reference, "Mesh to measure the distances to and from");
+  command->add_option("--reference", arguments->reference, "Mesh to compare with");
   command
       ->add_option("--reference-quads", arguments->reference_quads,
-                   "How quads of the reference are cut for the distances: better (along the diagonal that "
-                   "bends less, for "
-                   "a file of another program) or as-given (from the first corner to the third, which is "
-                   "what quads of "
-                   "hermesh mean) (default: better)")
+                   "How quads of the reference are split for distances: better (default), along the diagonal "
+                   "that bends less, for files of other programs, or as-given, from the first vertex to the "
+                   "third, as in files of hermesh")
       ->check(CLI::IsMember({"better", "as-given"}));
-  command->add_flag("--certify", arguments->certify,
-                    "Bound the Hausdorff distances to the reference for certain");
+  command->add_flag("--certify", options.certify,
+                    "Certify bounds of the Hausdorff distances to the reference");
   command->add_option("--features", arguments->features,
-                      "Mesh whose sharp edges and corners should be there");
+                      "Mesh whose sharp edges and corners the mesh should reproduce");
   command
-      ->add_option("--dihedral", arguments->dihedral, "Least angle of a sharp edge, in degrees (default: 30)")
+      ->add_option("--dihedral", options.dihedral_degrees,
+                   "Smallest angle of a sharp edge, in degrees (default: 30)")
       ->check(CLI::Range(0.0, 180.0));
   command
       ->add_option(
-          "--samples", arguments->samples,
-          "Samples on each surface for the distances (default: " + std::to_string(arguments->samples) + ")")
+          "--samples", options.samples,
+          "Samples on each surface for the distances (default: " + std::to_string(options.samples) + ")")
       ->transform(whole_number(1, 1'000'000'000));
   command
-      ->add_option("--solid-samples", arguments->solid_samples,
-                   "Samples for the comparison of the solid with that of the --reference; 0: it is not "
-                   "compared (default: " +
-                       std::to_string(arguments->solid_samples) + ")")
+      ->add_option("--solid-samples", options.solid_samples,
+                   "Samples for the comparison of the solid with that of --reference; 0: no comparison "
+                   "(default: " +
+                       std::to_string(options.solid_samples) + ")")
       ->transform(whole_number(0, 1'000'000'000));
   command->add_option(
       "--require", arguments->require,
-      "Exit with 3 unless the mesh is all of these, separated by commas: closed, manifold, oriented, "
-      "watertight (all of these, no-self-intersection, and no component inside out), no-self-intersection, "
-      "solid (bounds the solid of the --reference: no inner wall taken for an outer one, no part lost or "
-      "added); "
-      "with --reference, watertight asks that the solid is no other, too");
+      "Exit with 3 unless the mesh has all of these properties, separated by commas: closed, manifold, "
+      "oriented, no-self-intersection, watertight (all of these, and no component inside out), solid (bounds "
+      "the solid of --reference: no inner wall is an outer one, no part is lost or added); with --reference, "
+      "watertight also requires that the solid is not another one");
   command
-      ->add_option(
-          "--voxel-size", arguments->voxel_size,
-          "Voxels that the mesh was made from: what lies within √3 of them of the reference is explained "
-          "(default: three times the distance from the mesh to the reference)")
+      ->add_option("--voxel-size", options.voxel_size,
+                   "Voxel size of the volume that the mesh was made from: differences within √3 voxels of "
+                   "the reference are explained (default: three times the distance from the mesh to the "
+                   "reference)")
       ->check(CLI::PositiveNumber);
   add_json_option(*command, session);
-  command->callback([arguments, command, &session] {
-    session.command = [arguments, command, &session] { return run_validate(*arguments, *command, session); };
-  });
+  set_work(*command, session,
+           [arguments, command, &session] { return run_validate(*arguments, *command, session); });
 }
 
 }  // namespace hermesh::cli

@@ -79,7 +79,7 @@ void FractureFolder::add(PieceOutput&& piece, RunContext& context) {
   volume_ += piece.mass.volume;
 }
 
-validation::FractureLedger FractureFolder::judge(RunContext& context, const PolygonMesh& uncut,
+validation::FractureReport FractureFolder::judge(RunContext& context, const PolygonMesh& uncut,
                                                  double reach) const {
   std::vector<MeshFile> files;
   for (std::uint32_t piece = 1; piece <= pieces_.size(); ++piece)
@@ -88,7 +88,7 @@ validation::FractureLedger FractureFolder::judge(RunContext& context, const Poly
   validation::ExpectedVolumes expected{.whole = {}, .pieces = {}, .surface = &surface, .reach = reach};
   if (!uncut.empty()) expected.whole = mass_properties(uncut).volume;
   for (const Json& piece : pieces_) expected.pieces.push_back(piece.at("volume").get<double>());
-  return validation::judge_fracture(files, context, expected);
+  return validation::check_fracture(files, context, expected);
 }
 
 void FractureFolder::commit(Json head, const FractureSummary& summary, const Draw& draw,

@@ -10,7 +10,7 @@
 
 #include "algorithms/io/atomic_file.h"
 #include "experiments/fracture/fracture_run.h"
-#include "validation/fracture_ledger.h"
+#include "validation/fracture_report.h"
 
 namespace hermesh {
 
@@ -34,10 +34,10 @@ class FractureFolder {
   void commit(nlohmann::ordered_json head, const FractureSummary& summary, const Draw& draw,
               RunContext& context);
 
-  /// Reads the pieces' files back and judges them, also against the volumes that were recorded when they
+  /// Reads the pieces' files back and validates them, also against the volumes that were recorded when they
   /// were added, and against the uncut object's mesh if it is given. `reach` is how far from that the
   /// original surface of the pieces may be. @throws Error for a file that cannot be read; Cancelled
-  validation::FractureLedger judge(RunContext& context, const PolygonMesh& uncut = {},
+  validation::FractureReport judge(RunContext& context, const PolygonMesh& uncut = {},
                                    double reach = 0.0) const;
 
   /// Name of the file of piece number `piece`, which counts from 1 on.

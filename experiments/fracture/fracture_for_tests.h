@@ -1,4 +1,4 @@
-// Solids to break, cutters for them, and how the pieces are judged: for tests of fracture.
+// For tests of fracture: solids to break, cutters for them, and the validation of the pieces.
 #pragma once
 
 #include <Eigen/Geometry>
@@ -14,7 +14,7 @@
 #include "algorithms/hermite/samplers.h"
 #include "algorithms/io/mesh_file.h"
 #include "experiments/cases/recipes.h"
-#include "validation/fracture_ledger.h"
+#include "validation/fracture_report.h"
 
 namespace hermesh {
 
@@ -89,16 +89,16 @@ inline std::vector<PolygonMesh> pieces_of(const LabelledFracture& fracture) {
   return result;
 }
 
-inline validation::FractureLedger judged(const std::vector<PolygonMesh>& pieces,
+inline validation::FractureReport judged(const std::vector<PolygonMesh>& pieces,
                                          const validation::ExpectedVolumes& expected = {}) {
   RunContext context;
   std::vector<MeshFile> files;
   for (const PolygonMesh& piece : pieces) files.push_back(to_mesh_file(piece));
   for (std::size_t i = 0; i < pieces.size(); ++i) files[i].attributes = pieces[i].attributes;
-  return validation::judge_fracture(files, context, expected);
+  return validation::check_fracture(files, context, expected);
 }
 
-inline std::string text(const validation::FractureLedger& ledger) {
+inline std::string text(const validation::FractureReport& ledger) {
   std::string all;
   for (const std::string& s : ledger.sentences()) all += s + "\n";
   for (const std::string& s : ledger.places) all += s + "\n";

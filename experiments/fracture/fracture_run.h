@@ -1,4 +1,4 @@
-// One fracture by one of the methods, piece by piece: what the command line and the experiment share.
+// One fracture by one of the methods, piece by piece: shared by the command line and the experiment.
 #pragma once
 
 #include <optional>
@@ -35,16 +35,16 @@ struct FractureMethod {
 
 struct FractureSummary {
   std::uint32_t pieces = 0;
-  std::vector<CutterRecord> cutters;         ///< what each cutter took, by the method `labelled`
+  std::vector<CutterRecord> cutters;         ///< result of each cutter, by the method `labelled`
   std::optional<LabelledFracture> labelled;  ///< without its mesh
   std::vector<std::string> empty;            ///< names of cutters that took nothing, by the other methods
   double seconds = 0.0;  ///< time of the method itself: neither handing pieces over nor making polygons of
                          ///< OpenVDB's cutters
 };
 
-/// How far the pieces' original surface may be from uncut_mesh(), in world units: where pieces part, points
-/// are placed again within their cells. 0 if that is not known: for other methods than `labelled`, and if
-/// pieces come apart with a gap in place of a seam.
+/// Returns an upper bound of the distance of the pieces' original surface from uncut_mesh(), in world units:
+/// where pieces separate, vertices are recomputed within their cells. Returns 0 if the bound is not known:
+/// for methods other than `labelled`, and if pieces separate with a gap instead of a seam.
 double reach_of_pieces(const FractureObject& object, const FractureMethod& method,
                        const FractureSummary& summary);
 

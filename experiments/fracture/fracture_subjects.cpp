@@ -2,7 +2,6 @@
 
 #include "algorithms/hermite/samplers.h"
 #include "experiments/harness/cell.h"
-#include "experiments/harness/run_cells.h"
 #include "experiments/measure.h"
 #include "experiments/pipeline.h"
 

@@ -18,8 +18,8 @@ struct FractureSubject {
   double longest = 0.0;             ///< voxels
 };
 
-/// All subjects. Neither object of the figures is at hand: a rough ball and the Armadillo take their
-/// places, stretched to their boxes.
+/// Returns all subjects. Neither object of the figures is available; a rough ball and the Armadillo,
+/// stretched to their boxes, are used as substitutes.
 const std::vector<FractureSubject>& fracture_subjects();
 
 /// The mesh of a subject's case, stretched to its proportions. @throws Error as load_case() does.
@@ -29,7 +29,7 @@ struct SampledSubject {
   FractureObject object;
   double hermite_seconds = 0.0;  ///< time that the Hermite data took
 };
-/// The mesh as an object to break, sampled with so many voxels along its longest side, its signs from a
+/// The mesh as an object to break, sampled with `longest` voxels along its longest side, its signs from a
 /// voxelizer of `hermesh list`.
 SampledSubject sample_subject(const PolygonMesh& mesh, double longest, const MeasurementInput& input,
                               const std::string& voxelizer = "hermesh");

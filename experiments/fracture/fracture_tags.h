@@ -1,6 +1,6 @@
-// Are the polygons of the pieces of a fracture tagged as what they are, cut or original? Judged by the
-// input's triangles and the walls of Voronoi cells, which are known in closed form; nothing here asks the
-// method.
+// Checks that the polygons of a fracture's pieces are correctly tagged as cut or original. The reference is
+// the input's triangles and the walls of Voronoi cells, which are known in closed form; it does not depend on
+// the method.
 #pragma once
 
 #include <Eigen/Core>
@@ -23,7 +23,8 @@ struct TagCounts {
   double share_left_out() const { return polygons == 0 ? 0.0 : double(at_rims) / double(polygons); }
 };
 
-/// Distance from a place to the nearest wall between the Voronoi cells of at least two different seeds.
+/// Returns the distance from a point to the nearest wall between the Voronoi cells of at least two different
+/// seeds.
 double distance_to_walls(const std::vector<Eigen::Vector3d>& seeds, const Eigen::Vector3d& place);
 
 /// Counts the polygons of one piece after another. A polygon is truly cut if its middle is nearer to a wall

@@ -1,4 +1,4 @@
-// Fractures of procedural solids, judged on what their files would hold.
+// Fractures of procedural solids, validated on the contents of their files.
 #include "algorithms/fracture/fracture.h"
 
 #include <gtest/gtest.h>
@@ -25,10 +25,10 @@
 #include "experiments/pipeline.h"
 #include "experiments/promises/solids_for_tests.h"
 #include "experiments/variants.h"
-#include "validation/fracture_ledger.h"
+#include "validation/fracture_report.h"
 
 namespace hermesh {
-namespace {
+namespace fracture_test {
 
 using Eigen::Vector3d;
 
@@ -55,8 +55,8 @@ TEST_P(Fracture, TheBooksBalance) {
     const LabelledFracture fracture = labelled_fracture(object, *cutters, options, context);
     EXPECT_GE(fracture.piece_count(), 2u);
     const std::vector<PolygonMesh> pieces = pieces_of(fracture);
-    const validation::FractureLedger ledger = judged(pieces);
-    EXPECT_TRUE(ledger.balances()) << tolerance << ": " << text(ledger);
+    const validation::FractureReport ledger = judged(pieces);
+    EXPECT_TRUE(ledger.is_valid()) << tolerance << ": " << text(ledger);
     EXPECT_GT(ledger.seam_triangles, 0);
     const std::size_t triangles = fracture.mesh.triangles.size();
     if (tolerance == 0.0)
@@ -117,8 +117,8 @@ TEST(Fracture, OfRandomLabelsBalances) {
     const LabelledFracture fracture = labelled_fracture(object, RandomCodes(kinds), options, context);
     EXPECT_GE(fracture.piece_count(), 2u);
     EXPECT_GT(fracture.mesh.several_sheets, 0u);
-    const validation::FractureLedger ledger = judged(pieces_of(fracture));
-    EXPECT_TRUE(ledger.balances()) << kinds << ": " << text(ledger);
+    const validation::FractureReport ledger = judged(pieces_of(fracture));
+    EXPECT_TRUE(ledger.is_valid()) << kinds << ": " << text(ledger);
   }
 }
 
@@ -134,7 +134,7 @@ TEST(FractureTags, OfAWallNearlyTangentToTheObjectKeepWithinAVoxel) {
     ASSERT_EQ(fracture.piece_count(), 2u);
     EXPECT_EQ(fracture.repair.changed_samples, 0u) << height;
     EXPECT_EQ(fracture.made_up_crossings, 0u) << height;
-    EXPECT_TRUE(judged(pieces_of(fracture)).balances());
+    EXPECT_TRUE(judged(pieces_of(fracture)).is_valid());
     for (const PolygonMesh& piece : pieces_of(fracture))
       for (std::size_t t = 0; t < piece.triangles.size(); ++t)
         for (const std::uint32_t p : piece.triangles[t]) {
@@ -185,7 +185,7 @@ TEST(FractureBytes, AreTheSameAtAnyThreadCountAndLevelOfVectorCode) {
 }
 
 /// The books of a fracture of polygons, made as the program makes it by default.
-validation::FractureLedger ledger_of(const PolygonMesh& mesh, double longest, const std::string& cutters,
+validation::FractureReport ledger_of(const PolygonMesh& mesh, double longest, const std::string& cutters,
                                      std::uint64_t seed, RunContext& context, double tolerance = 0.0) {
   const LevelSet level_set =
       voxelize(mesh, {.chosen = choose(all_voxelizers(), "hermesh"), .resolution = longest}, context);
@@ -206,7 +206,7 @@ validation::FractureLedger ledger_of(const PolygonMesh& mesh, double longest, co
                          .reach = reach_of_pieces({object, level_set}, method, summary)});
 }
 
-/// The cubes of edge length 3 at the places, which have corners in common.
+/// Cubes of edge length 3 at the given positions, which have corners in common.
 PolygonMesh cubes(const std::vector<Vector3d>& places) {
   MeshFile file;
   for (const Vector3d& place : places) {
@@ -227,7 +227,7 @@ TEST(FractureOfPolygons, PiecesThatTouchInEdgesPassTheJudge) {
       for (const double longest : {18.0, 30.0})
         for (const double tolerance : {0.0, 1.0}) {
           RunContext context;
-          const validation::FractureLedger ledger = ledger_of(*mesh, longest, cutters, 0, context, tolerance);
+          const validation::FractureReport ledger = ledger_of(*mesh, longest, cutters, 0, context, tolerance);
           EXPECT_GE(ledger.pieces, 2);
           EXPECT_TRUE(ledger.is_consistent())
               << cutters << " " << longest << " " << tolerance << ": " << text(ledger);
@@ -246,27 +246,27 @@ TEST(FractureOfPolygons, BalancesWhereNormalsJoinTwoPiecesAcrossAFace) {
     const PolygonMesh mesh =
         load_case((experiments_folder() / "test_inputs" / c.file).string(), context).mesh;
     for (std::uint64_t seed = 0; seed < 5; ++seed) {
-      const validation::FractureLedger ledger = ledger_of(mesh, c.longest, c.cutters, seed, context);
+      const validation::FractureReport ledger = ledger_of(mesh, c.longest, c.cutters, seed, context);
       EXPECT_TRUE(ledger.is_consistent()) << c.file << " " << seed << ": " << text(ledger);
     }
   }
 }
 
-/// Expects the books of trials to balance. Returns how many have a gap in place of a seam: parts thinner
-/// than a voxel, which come apart where no lattice edge is cut. That is a known fault; the judge fails it,
-/// and the fracture must have said so.
+/// Expects the volumes of the trials to add up. Returns the number of trials with a gap instead of a seam:
+/// parts thinner than a voxel, which separate where no lattice edge is cut. This is a known defect; the
+/// validator fails it, and the fracture must have reported it.
 int expect_balance(std::uint64_t first, std::uint64_t count) {
   int gaps = 0;
   for (std::uint64_t number = first; number < first + count; ++number) {
     const FractureTrial trial = fracture_trial(number);
     RunContext context;
-    validation::FractureLedger ledger = ledger_of(trial.mesh, trial.longest, trial.cutters, number, context);
-    if (!ledger.gaps_can_be_judged) {
+    validation::FractureReport ledger = ledger_of(trial.mesh, trial.longest, trial.cutters, number, context);
+    if (!ledger.gaps_checked) {
       ++gaps;
       EXPECT_TRUE(std::ranges::any_of(context.notes, [](const std::string& note) {
         return note.find("too thin for a seam") != std::string::npos;
       })) << number;
-      ledger.gaps_can_be_judged = true;  // all the rest must hold
+      ledger.gaps_checked = true;  // all the rest must hold
     }
     EXPECT_TRUE(ledger.is_consistent()) << trial.kind << " " << number << ": " << text(ledger);
   }
@@ -333,7 +333,7 @@ TEST(FractureOfABox, CutByTwoPlanesIsExact) {
   for (std::size_t i = 0; i < 4; ++i)
     EXPECT_NEAR(mass_properties(pieces[i]).volume, x[i & 1] * y[i >> 1] * 16.6, 1e-3)
         << fracture.names[i + 1];
-  EXPECT_TRUE(judged(pieces).balances());
+  EXPECT_TRUE(judged(pieces).is_valid());
 }
 
 PolygonMesh cuboid(const Vector3d& lower, const Vector3d& upper) {
@@ -372,7 +372,7 @@ TEST(FractureTags, TellCutFromOriginal) {
 }
 
 TEST(FractureTags, AreJudgedByInputAndWalls) {
-  // A box of half sides 10, 9, 8 and seeds at x = ±4: the wall is x = 0. Each half is told right at first:
+  // A box of half sides 10, 9, 8 and seeds at x = ±4: the wall is x = 0. Each half is first tagged correctly:
   // its five sides of the box and a rectangle at the wall, all of two triangles.
   const std::vector<Vector3d> seeds = {{-4, 0, 0}, {4, 0, 0}};
   EXPECT_DOUBLE_EQ(distance_to_walls(seeds, {-1.5, 7, 1}), 1.5);
@@ -388,7 +388,7 @@ TEST(FractureTags, AreJudgedByInputAndWalls) {
   EXPECT_EQ(judge.counts().at_rims, 0);
   EXPECT_EQ(judge.counts().precision(), 1.0);
   EXPECT_EQ(judge.counts().recall(), 1.0);
-  // Told wrong: the wall is said to be original, a side to be cut.
+  // Wrong tags: the wall is tagged as original, a side as cut.
   left.attributes[0].values = std::vector<std::int32_t>{1, 0, 0, 0, 0, 0};
   judge.add(left);
   EXPECT_EQ(judge.counts().precision(), 0.5);
@@ -446,7 +446,7 @@ TEST(FractureCutters, EachGetsARecord) {
   EXPECT_EQ(fracture.merged[0].samples, 8u);
   EXPECT_EQ(fracture.merged[0].name, "taken by sliver");
   EXPECT_EQ(fracture.merged[0].into_name, cutters->name_of(meshes.size()));
-  EXPECT_TRUE(judged(pieces_of(fracture)).balances());
+  EXPECT_TRUE(judged(pieces_of(fracture)).is_valid());
 }
 
 TEST(FractureCutters, APlaneOrCellWhoseSliverWasMergedSaysSo) {
@@ -481,7 +481,7 @@ TEST(FractureCutters, OneThatSwallowsTheObjectLeavesItWhole) {
   const LabelledFracture fracture = labelled_fracture(object, *cutters, {}, context);
   EXPECT_EQ(fracture.piece_count(), 1u);
   EXPECT_EQ(fracture.cutters[0].state, CutterRecord::State::swallows);
-  EXPECT_TRUE(judged(pieces_of(fracture)).balances());
+  EXPECT_TRUE(judged(pieces_of(fracture)).is_valid());
 }
 
 TEST(FractureCutters, ThatEndInAFaceOfTheObject) {
@@ -493,8 +493,8 @@ TEST(FractureCutters, ThatEndInAFaceOfTheObject) {
         mesh_cutters({{"half", cuboid({0.5, -side, -side}, {side, side, side})}}, object.placement, context);
     const LabelledFracture fracture = labelled_fracture(object, *cutters, {}, context);
     EXPECT_GE(fracture.piece_count(), 2u);
-    const validation::FractureLedger ledger = judged(pieces_of(fracture));
-    EXPECT_TRUE(ledger.balances()) << side << text(ledger);
+    const validation::FractureReport ledger = judged(pieces_of(fracture));
+    EXPECT_TRUE(ledger.is_valid()) << side << text(ledger);
   }
 }
 
@@ -513,8 +513,8 @@ TEST(FractureOptions, NoSplitLeavesOnePieceOfSeveralSurfaces) {
   options.split = false;
   const LabelledFracture whole = labelled_fracture(object, *cutters, options, context);
   EXPECT_EQ(whole.piece_count(), 2u);
-  EXPECT_TRUE(judged(pieces_of(whole)).balances());
+  EXPECT_TRUE(judged(pieces_of(whole)).is_valid());
 }
 
-}  // namespace
+}  // namespace fracture_test
 }  // namespace hermesh

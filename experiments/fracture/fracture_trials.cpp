@@ -1,6 +1,5 @@
 #include "experiments/fracture/fracture_trials.h"
 
-#include "experiments/cases/recipe_random.h"
 #include "experiments/cases/recipe_shapes.h"
 
 namespace hermesh {

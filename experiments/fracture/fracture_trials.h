@@ -1,4 +1,5 @@
-// Random solids that fractures are tried on: what hangs together by a hair, or across no lattice edge.
+// Random solids for fracture trials, with parts that are barely connected, or connected across no lattice
+// edge.
 #pragma once
 
 #include <cstdint>
@@ -8,7 +9,7 @@
 
 namespace hermesh {
 
-/// A closed mesh off the lattice, how finely it is sampled, and what breaks it.
+/// A closed mesh that is not aligned with the lattice, its sampling resolution, and its cutters.
 struct FractureTrial {
   std::string kind;  ///< solids, plates, shell or bars
   PolygonMesh mesh;

@@ -10,7 +10,7 @@
 #include "experiments/fracture/fracture_for_tests.h"
 
 namespace hermesh {
-namespace {
+namespace thesis_fracture_test {
 
 using Eigen::Vector3d;
 
@@ -44,9 +44,9 @@ TEST(FractureMethods, TheThesisLeavesGapsAndTheVolumeNearlyAddsUp) {
     for (const double threshold : {0.0, 0.1}) {
       ThesisPieces pieces;
       break_by_thesis(pieces, object, *cutters, {rule, threshold});
-      const validation::FractureLedger ledger = judged(pieces.meshes);
-      EXPECT_FALSE(ledger.gaps_can_be_judged);
-      EXPECT_FALSE(ledger.balances()) << text(ledger);
+      const validation::FractureReport ledger = judged(pieces.meshes);
+      EXPECT_FALSE(ledger.gaps_checked);
+      EXPECT_FALSE(ledger.is_valid()) << text(ledger);
       EXPECT_GE(pieces.figure("escaped"), 0.0);
       if (rule == Rule::printed) {
         // Polygons that bound nothing lie along the rims, and where all samples are taken they are a piece of
@@ -97,10 +97,10 @@ FloatHermite straight_box() {
                  {20, 20, 20});
 }
 
-// Eq. 7.1 by hand (trap T11). The face x = 8.3 of a box and the plane x = 8.1 cross the same edges, from 8
-// to 9. Beyond the plane lie 0.2 voxel of the box and no sample. At a sample x = 8 the box has the component
-// −0.3, and what is beyond the plane 0.1: the intersection takes the greater one, with its data, although
-// both ends of the edge are outside of it.
+// Eq. 7.1 by hand (trap T11). The face x = 8.3 of a box and the plane x = 8.1 cross the same edges, from 8 to
+// 9. Beyond the plane lie 0.2 voxel of the box and no sample. At a sample x = 8 the box has the component
+// −0.3, and the half-space beyond the plane 0.1: the intersection takes the greater one, with its data,
+// although both ends of the edge are outside of it.
 TEST(FractureMethods, TheEquationLeavesDataBetweenSamplesOfOneSign) {
   const FloatHermite object = straight_box();
   const auto cutters = plane_cutters({{Vector3d(1, 0, 0), 8.1}}, object.placement);
@@ -113,7 +113,7 @@ TEST(FractureMethods, TheEquationLeavesDataBetweenSamplesOfOneSign) {
   EXPECT_EQ(printed.figure("needless_crossings"), 169.0);
   ASSERT_EQ(printed.meshes.size(), 2u);
   EXPECT_EQ(printed.meshes[1].quads.size(), 169u);
-  // The first one is the box up to the plane, but for the rounding of offsets.
+  // The first one is the box up to the plane, except for the rounding of offsets.
   EXPECT_NEAR(mass_properties(printed.meshes[0]).volume, repaired.volume, 0.005 * repaired.volume);
 }
 
@@ -150,5 +150,5 @@ TEST(FractureMethods, TheThesisMakesTheSameBytesAtAnyNumberOfThreads) {
   }
 }
 
-}  // namespace
+}  // namespace thesis_fracture_test
 }  // namespace hermesh

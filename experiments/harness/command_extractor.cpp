@@ -25,7 +25,7 @@
 #include "algorithms/io/mesh_file.h"
 #include "algorithms/io/vdb_file.h"
 #include "algorithms/variants.h"
-#include "experiments/cases/shell.h"
+#include "experiments/cases/cases.h"
 #include "experiments/measure.h"
 #include "experiments/pipeline.h"
 
@@ -34,7 +34,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// A folder of its own for each run, which is removed with all that is in it.
+/// A temporary directory.
 class Scratch {
  public:
   Scratch() {
@@ -56,13 +56,12 @@ class Scratch {
 };
 
 const std::regex kPlaceholder("\\{([a-z.]*|[0-9.]+ voxel)\\}"), kVoxels("([0-9]+(\\.[0-9]+)?) voxel");
-const std::regex kIn("in(\\.(ply|obj|stl|off))?"), kOut("out(\\.(ply|obj|stl|off))?"),
-    kUniform("uniform(\\.(ply|obj|stl|off))?");
+const std::regex kMeshFile("(in|out|uniform)(\\.(ply|obj|stl|off))?");
 
 /// Exit codes: Automake's for a test that is skipped, and the shell's for a program that it does not find.
 constexpr int kSkipped = 77, kNotFound = 127;
 
-/// Calls `replace` for each word in braces, and puts what it returns in its place.
+/// Replaces each word in braces by the result of `replace`.
 std::string replaced(const std::string& command,
                      const std::function<std::string(const std::string&)>& replace) {
   std::string text;
@@ -83,8 +82,7 @@ std::string last_line(const fs::path& file) {
   return shown(last, 200);
 }
 
-/// The number of the last line "word NUMBER"; none where there is no such line, or no finite number that is
-/// not negative.
+/// Returns the number of the last line "word NUMBER" with a finite number that is not negative.
 std::optional<double> number_said(const fs::path& file, const std::string& word) {
   std::ifstream stream(file);
   std::optional<double> number;
@@ -98,13 +96,7 @@ std::optional<double> number_said(const fs::path& file, const std::string& word)
   return number;
 }
 
-std::string plain_number(double value) {
-  char text[40];
-  std::snprintf(text, sizeof text, "%.17g", value);
-  return text;
-}
-
-/// Runs the command with its output in a file, and waits. @throws Cancelled; Error if it does not end with 0.
+/// Runs the command with its output in a file. @throws Cancelled; Error if it does not end with 0.
 void run_shell(const std::string& command, const fs::path& log, RunContext& context) {
   const std::string name = log.string();
   const pid_t parent = getpid();
@@ -141,7 +133,7 @@ void run_shell(const std::string& command, const fs::path& log, RunContext& cont
   if (WEXITSTATUS(status) == kNotFound) throw ProgramAbsent("the shell does not find its program");
   if (WEXITSTATUS(status) == kSkipped)
     throw ProgramAbsent(said.empty() ? "it ended with 77 and without a reason" : said);
-  if (WEXITSTATUS(status) > 128)  // the shell's word for it
+  if (WEXITSTATUS(status) > 128)  // reported by the shell
     throw Error(std::string("the command crashed (") + strsignal(WEXITSTATUS(status) - 128) + ")" + more);
   if (WEXITSTATUS(status) != 0)
     throw Error("the command ended with exit code " + std::to_string(WEXITSTATUS(status)) + more);
@@ -156,31 +148,22 @@ void run_shell(const std::string& command, const fs::path& log, RunContext& cont
   context.figure(std::string(kCommandPeakBytes), own_bytes.value_or(peak));
 }
 
-PolygonMesh uniform_mesh(const ExtractionInput& input, RunContext& context) {
-  const ExtractRecipe recipe{.chosen = choose(our_extractors(), "marching-cubes")};
-  return extract(input.level_set, input.source, recipe, context).mesh;
-}
-
 PolygonMesh run_command(const ExtractionInput& input) {
   const Scratch scratch;
   fs::path made;
-  RunContext quiet;  // what the writers note about precision is about a file that is gone afterwards
+  RunContext quiet;  // drops warnings about the precision of temporary files
   quiet.cancel = input.context.cancel;
   const std::string command = replaced(input.options.text("run"), [&](const std::string& word) {
-    if (std::regex_match(word, kIn)) {
-      if (!input.source)
-        throw Error("the command wants polygons ({in}), and the volume was not made from any");
-      const fs::path file = scratch / (word == "in" ? "in.ply" : word);
-      if (!fs::exists(file)) write_mesh(file, *input.source, quiet);
-      return shell_quoted(file.string());
-    }
-    if (std::regex_match(word, kOut)) {
-      made = scratch / (word == "out" ? "out.ply" : word);
-      return shell_quoted(made.string());
-    }
-    if (std::regex_match(word, kUniform)) {
-      const fs::path file = scratch / (word == "uniform" ? "uniform.ply" : word);
-      if (!fs::exists(file)) write_mesh(file, uniform_mesh(input, quiet), quiet);
+    if (std::smatch name; std::regex_match(word, name, kMeshFile)) {
+      const fs::path file = scratch / (name[2].matched ? word : word + ".ply");
+      if (name[1] == "in" && !input.source)
+        throw Error("the command needs polygons ({in}), but the volume was not made from any");
+      if (name[1] == "in" && !fs::exists(file)) write_mesh(file, *input.source, quiet);
+      if (name[1] == "uniform" && !fs::exists(file)) {
+        const ExtractRecipe recipe{.chosen = choose(our_extractors(), "marching-cubes")};
+        write_mesh(file, extract(input.level_set, input.source, recipe, quiet).mesh, quiet);
+      }
+      if (name[1] == "out") made = file;
       return shell_quoted(file.string());
     }
     if (word == "source") return shell_quoted(HERMESH_SOURCE_DIR);
@@ -190,9 +173,13 @@ PolygonMesh run_command(const ExtractionInput& input) {
       if (!fs::exists(file)) write_level_set(file, input.level_set, quiet);
       return shell_quoted(file.string());
     }
-    if (std::smatch number; std::regex_match(word, number, kVoxels))
-      return plain_number(std::strtod(number[1].str().c_str(), nullptr) * input.level_set.voxel_size());
-    if (word == "voxel") return plain_number(input.level_set.voxel_size());
+    std::smatch number;
+    if (word == "voxel" || std::regex_match(word, number, kVoxels)) {
+      const double factor = word == "voxel" ? 1.0 : std::strtod(number[1].str().c_str(), nullptr);
+      char text[40];
+      std::snprintf(text, sizeof text, "%.17g", factor * input.level_set.voxel_size());
+      return std::string(text);
+    }
     return std::to_string(tbb::global_control::active_value(tbb::global_control::max_allowed_parallelism));
   });
   run_shell(command, scratch / "log", input.context);
@@ -208,14 +195,15 @@ PolygonMesh run_command(const ExtractionInput& input) {
 Extractor command_extractor(const std::string& name, const std::string& command) {
   bool writes = false;
   replaced(command, [&](const std::string& word) {
-    writes = writes || std::regex_match(word, kOut);
+    std::smatch parts;
+    const bool is_file = std::regex_match(word, parts, kMeshFile);
+    writes = writes || (is_file && parts[1] == "out");
     static const std::set<std::string> plain = {"volume", "voxel", "threads", "source", "build"};
-    if (!std::regex_match(word, kIn) && !std::regex_match(word, kOut) && !std::regex_match(word, kUniform) &&
-        !std::regex_match(word, kVoxels) && !plain.contains(word))
+    if (!is_file && !std::regex_match(word, kVoxels) && !plain.contains(word))
       throw Error(
-          "a command knows {in}, {uniform}, {volume}, {out}, {voxel} or {0.25 voxel}, {threads}, {source} "
-          "and {build}, and not {" +
-          word + "}");
+          "unknown word {" + word +
+          "} in a command; expected {in}, {uniform}, {volume}, {out}, {voxel} or {0.25 voxel}, {threads}, "
+          "{source} or {build}");
     return std::string();
   });
   if (!writes) throw Error("a command needs {out}, the file that it has to write");

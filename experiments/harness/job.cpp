@@ -6,8 +6,6 @@
 
 #include "experiments/harness/cell.h"
 #include "experiments/harness/command_extractor.h"
-#include "experiments/harness/run_cells.h"
-#include "experiments/harness/run_voxelizers.h"
 
 namespace hermesh {
 namespace {

@@ -1,8 +1,9 @@
 #include "experiments/harness/measurement.h"
 
+#include <tbb/global_control.h>
+
 #include <algorithm>
 #include <chrono>
-#include <iterator>
 #include <sstream>
 
 #include "experiments/harness/cell.h"
@@ -11,7 +12,7 @@
 namespace hermesh {
 namespace {
 
-/// @throws Error for what the measurement did not declare: no report would show it.
+/// @throws Error for data that the measurement did not declare, because no report would show them.
 const MeasuredTable& table_of(const MeasuredRow& row, const Measurement& measurement) {
   const auto named = [](const std::string& name) {
     return [&](const auto& each) { return each.name == name; };
@@ -53,14 +54,17 @@ Json row_json(const Json& head, const std::string& table, const std::string& lab
 
 }  // namespace
 
-std::vector<std::string> words_in(const std::string& list) {
-  std::istringstream words(list);
-  return {std::istream_iterator<std::string>(words), {}};
+std::vector<std::string> words_in(const std::string& list, char separator) {
+  std::istringstream stream(list);
+  std::vector<std::string> words;
+  for (std::string word; std::getline(stream, word, separator);) words.push_back(word);
+  return words;
 }
 
-std::vector<double> numbers_in(const std::string& list) {
-  std::istringstream numbers(list);
-  return {std::istream_iterator<double>(numbers), {}};
+std::vector<double> numbers_in(const std::string& list, char separator) {
+  std::vector<double> numbers;
+  for (const std::string& word : words_in(list, separator)) numbers.push_back(std::stod(word));
+  return numbers;
 }
 
 std::vector<std::string> case_choices() {
@@ -68,6 +72,35 @@ std::vector<std::string> case_choices() {
   for (const CaseInfo& info : list_cases())
     if (info.kind != "volume") names.push_back(info.name);
   return names;
+}
+
+LevelSet voxelized(const PolygonMesh& mesh, VoxelizeRecipe recipe, const MeasurementInput& input) {
+  recipe.chosen = choose(input.tables.voxelizers, "hermesh");
+  return voxelize(mesh, recipe, input.context);
+}
+
+RepeatedExtraction extract_repeatedly(const LevelSet& level_set, const ExtractRecipe& recipe,
+                                      const MeasurementInput& input) {
+  RepeatedExtraction result;
+  std::vector<double> seconds;
+  for (int run = 0; run < int(input.parameters.number("repetitions")); ++run) {
+    input.context.check();
+    result.mesh = {};
+    result.context = child_context(input.context, false);
+    const PeakMemory memory;
+    seconds.push_back(timed([&] { result.mesh = extract(level_set, nullptr, recipe, result.context).mesh; }));
+    if (const auto peak = memory.bytes(); run == 0 && peak) result.peak = double(*peak) / (1 << 20);
+  }
+  result.seconds = median(seconds);
+  return result;
+}
+
+std::vector<std::size_t> thread_counts() {
+  const std::size_t most = tbb::global_control::active_value(tbb::global_control::max_allowed_parallelism);
+  std::vector<std::size_t> counts;
+  for (std::size_t count = 1; count < most; count *= 2) counts.push_back(count);
+  counts.push_back(most);
+  return counts;
 }
 
 std::vector<Json> run_measurement(const MeasurementJob& job, const Tables& tables, RunContext& context,
@@ -84,7 +117,7 @@ std::vector<Json> run_measurement(const MeasurementJob& job, const Tables& table
     if (keep) keep(row);
     rows.push_back(std::move(row));
   };
-  // What the measurement loads is an input of the rows that come after.
+  // Cases that the measurement loads are inputs of the rows that follow.
   Tables recorded = tables;
   const auto record = [&](LoadedCase loaded) {
     Json entry = {{"name", loaded.name}, {"origin", loaded.origin}, {"sha256", loaded.sha256}};

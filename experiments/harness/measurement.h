@@ -15,27 +15,29 @@
 #include "algorithms/core/options.h"
 #include "algorithms/core/run_context.h"
 #include "experiments/harness/json_values.h"
+#include "experiments/pipeline.h"
 
 namespace hermesh {
 
 struct Tables;
 
-/// What a measurement is given.
+/// The input of a measurement.
 struct MeasurementInput {
-  const Options& parameters;  ///< those of its entry, from the tier of the file
-  std::uint64_t seed;         ///< for its random numbers
-  const Tables& tables;       ///< to load cases with, and to find variants in
-  std::filesystem::path out;  ///< folder of the run
+  const Options& parameters;
+  std::uint64_t seed;
+  const Tables& tables;       ///< of cases and methods
+  std::filesystem::path out;  ///< directory of the run
   RunContext& context;
-  /// Rows whose "measurement/table/label" does not contain it are thrown away.
+  /// Rows whose "measurement/table/label" does not contain it are dropped.
   std::string filter = {};
-  /// Takes rows that are ready, before those that measure() returns, so that what takes hours can be cut
-  /// short and loses nothing; from one thread at a time.
+  /// Takes finished rows before those that the function returns, so that a measurement of hours can be
+  /// interrupted without losing them; from one thread at a time.
   std::function<void(std::vector<struct MeasuredRow>)> emit = {};
   std::string name = {};            ///< of the measurement
-  std::set<std::string> done = {};  ///< "table/label" of rows that there are already
+  std::set<std::string> done = {};  ///< "table/label" of existing rows
 
-  /// Whether the filter leaves a row of that label. A measurement asks before it does what the row needs.
+  /// Returns true if a row with that label is missing and passes the filter. A measurement asks before it
+  /// does the work for the row.
   bool wants(const std::string& table, const std::string& label) const {
     return !done.contains(table + "/" + label) &&
            (name + "/" + table + "/" + label).find(filter) != std::string::npos;
@@ -45,12 +47,12 @@ struct MeasurementInput {
   }
 };
 
-/// A line of one of its tables.
+/// A row of one of its tables.
 struct MeasuredRow {
   std::string table;
-  std::string label;  ///< who or what was measured: the first column, and a plot's curve
-  Json values = {};   ///< a number, text or truth value by column; an absent one is shown as "–"
-  std::vector<std::string> broken = {};  ///< what should hold and does not; makes the exit code 3
+  std::string label;  ///< first column of the table, and curve of a plot
+  Json values = {};   ///< by column: a number, text or truth value; a missing one is shown as "–"
+  std::vector<std::string> broken = {};  ///< violated expectations; they make the exit code 3
 };
 
 struct MeasuredColumn {
@@ -64,28 +66,42 @@ struct MeasuredTable {
   std::string title;
   std::string first_column;  ///< header of the labels
   std::vector<MeasuredColumn> columns;
-  bool printed = true;  ///< false for rows that are only there to be plotted
-  /// Whether rows of a later run under other labels or of other resolutions join those of earlier runs: of
-  /// tables that take hours, and whose rows need not be of one run because their times are not compared.
-  bool additive = false;
+  bool printed = true;    ///< false for rows that appear in plots only
+  bool additive = false;  ///< rows of later runs with other labels or resolutions join those of earlier runs
 };
 
+/// See experiments/measurements.toml.
 struct Measurement {
   std::string name;
-  std::string summary;                 ///< one line
-  std::vector<OptionSpec> parameters;  ///< keys that a tier of the file may set
+  std::vector<OptionSpec> parameters;
   std::vector<MeasuredTable> tables;
   std::function<std::vector<MeasuredRow>(const MeasurementInput&)> measure;
 };
 
-/// What a parameter lists, separated by blanks.
-std::vector<std::string> words_in(const std::string& list);
-std::vector<double> numbers_in(const std::string& list);
+/// Splits the value of a parameter at a separator.
+std::vector<std::string> words_in(const std::string& list, char separator = ' ');
+std::vector<double> numbers_in(const std::string& list, char separator = ' ');
 
-/// For a parameter that names a case: what it may be.
+/// Returns the cases of polygons.
 std::vector<std::string> case_choices();
 
-/// A measurement to be made (harness/job.h).
+/// Voxelizes with the method "hermesh" and otherwise by the recipe.
+LevelSet voxelized(const PolygonMesh& mesh, VoxelizeRecipe recipe, const MeasurementInput& input);
+
+struct RepeatedExtraction {
+  PolygonMesh mesh;
+  RunContext context;          ///< of the last run
+  double seconds;              ///< median
+  std::optional<double> peak;  ///< memory of the first run, MiB
+};
+/// Extracts as often as the parameter "repetitions" states.
+RepeatedExtraction extract_repeatedly(const LevelSet& level_set, const ExtractRecipe& recipe,
+                                      const MeasurementInput& input);
+
+/// Returns 1, 2, 4, … and the number of threads of the program.
+std::vector<std::size_t> thread_counts();
+
+/// A job of the laboratory (cells/serve.h).
 struct MeasurementJob {
   std::string name;
   std::map<std::string, std::string> parameters = {};  ///< as given
@@ -96,8 +112,8 @@ struct MeasurementJob {
   Json head = Json::object();       ///< the first keys of all rows
 };
 
-/// Makes the measurement and returns its rows; `keep` gets each as soon as it is ready. A failure is a row,
-/// too.
+/// Runs the measurement and returns its rows; `keep` receives each as soon as it is ready. A failure becomes
+/// a row.
 /// @throws Cancelled; Error for an unknown measurement or parameter, for a row of a table or a value of a
 /// column that the measurement did not declare.
 std::vector<Json> run_measurement(const MeasurementJob& job, const Tables& tables, RunContext& context,

@@ -1,5 +1,3 @@
-#include "experiments/harness/run_cells.h"
-
 #include <algorithm>
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -8,7 +6,7 @@
 #include "algorithms/voxelization/outputs/lost_surface.h"
 #include "experiments/harness/cell.h"
 #include "experiments/harness/command_extractor.h"
-#include "experiments/harness/digest.h"
+#include "experiments/harness/facts.h"
 #include "experiments/pipeline.h"
 #include "validation/geometry/distance.h"
 #include "validation/report_json.h"
@@ -160,10 +158,10 @@ class Group {
     judge_file(cell);
   }
 
-  /// Judges the mesh as its file holds it, so that the writer and the reader are judged with it.
+  /// Validates the mesh as stored in its file, so that the writer and the reader are validated with it.
   void judge_file(Cell& cell) {
     RunContext child = child_context(context_, true);
-    validation::JudgeOptions options;
+    validation::CheckOptions options;
     options.self_intersections = job_.self_intersections;
     options.reference = &source_;
     options.samples = job_.samples;

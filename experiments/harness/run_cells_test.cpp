@@ -12,7 +12,7 @@
 #include "experiments/variants.h"
 
 namespace hermesh {
-namespace {
+namespace run_cells_test {
 
 int calls = 0;  ///< of make_toy()
 
@@ -293,5 +293,5 @@ TEST(GroupJobs, KeysAreRequiredExceptThoseThatMayBeNull) {
   EXPECT_THROW(read_group_job(job), Error);
 }
 
-}  // namespace
+}  // namespace run_cells_test
 }  // namespace hermesh

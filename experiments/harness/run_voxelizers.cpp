@@ -1,5 +1,3 @@
-#include "experiments/harness/run_voxelizers.h"
-
 #include <array>
 #include <cstdio>
 #include <memory>
@@ -8,8 +6,7 @@
 
 #include "algorithms/core/level_set_grid.h"
 #include "experiments/harness/cell.h"
-#include "experiments/harness/digest.h"
-#include "experiments/harness/level_set_facts.h"
+#include "experiments/harness/facts.h"
 #include "experiments/pipeline.h"
 #include "reference/level_set_judge.h"
 #include "validation/report_json.h"
@@ -69,7 +66,7 @@ Json to_json(const SignReport& report) {
           {"places", places_json(report.places)}};
 }
 
-/// Returns what all rows of the group begin with.
+/// Returns the fields with which all rows of the group begin.
 Json head_of(const GroupJob& job, const LoadedCase& input, double voxel_size) {
   Json head = job.head;
   head["case"] = case_json(input);
@@ -204,7 +201,7 @@ class VoxelizerGroup {
   }
 
   void first_run(VoxelizerCell& cell, const Truths* truths) {
-    // OpenVDB's registers are the process's, not those of whoever happens to be measured first.
+    // OpenVDB's registers belong to the process and must not be charged to the first method measured.
     initialize_openvdb();
     const PeakMemory memory;
     const Once first = once(cell, true);

@@ -8,12 +8,12 @@
 #include "algorithms/core/level_set_grid.h"
 #include "experiments/cases/recipes.h"
 #include "experiments/cases/test_volumes.h"
+#include "experiments/harness/facts.h"
 #include "experiments/harness/jobs_for_tests.h"
-#include "experiments/harness/level_set_facts.h"
 #include "reference/variants.h"
 
 namespace hermesh {
-namespace {
+namespace run_voxelizers_test {
 
 LevelSet edited(const LevelSet& level_set, const std::function<void(openvdb::FloatGrid&)>& edit) {
   const openvdb::FloatGrid::Ptr copy = level_set.grid().grid->deepCopy();
@@ -185,5 +185,5 @@ TEST(SurfaceComponents, AreCounted) {
   EXPECT_EQ(count({2, 6}), 2);
 }
 
-}  // namespace
+}  // namespace run_voxelizers_test
 }  // namespace hermesh

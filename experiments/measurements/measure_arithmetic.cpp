@@ -1,25 +1,17 @@
-// Small claims of chapters 2 to 4 of the thesis that numbers decide: shared points (§2.2), how common broken
-// models are (§2.1), blocks (§3.1), the operations of the normal code and its look-up table (§4.1).
+// Claims of chapters 2 to 4 of the thesis: shared vertices (§2.2), how common defective models are (§2.1),
+// blocks (§3.1), the operations of the normal code and its look-up table (§4.1).
 #include <unistd.h>
 
-#include <algorithm>
 #include <array>
 #include <bit>
 #include <cmath>
-#include <cstdint>
 #include <cstring>
-#include <optional>
 #include <unordered_map>
 
 #include "algorithms/core/level_set_grid.h"
-#include "algorithms/hermite/normal_codes/thesis.h"
-#include "experiments/cases/cases.h"
+#include "algorithms/hermite/normal_codes.h"
 #include "experiments/cases/random_normals.h"
-#include "experiments/harness/cell.h"
-#include "experiments/harness/run_cells.h"
-#include "experiments/measure.h"
 #include "experiments/measurements/measurements.h"
-#include "experiments/pipeline.h"
 
 namespace hermesh {
 namespace {
@@ -28,8 +20,7 @@ using Normal = std::array<float, 3>;
 
 // ---- §2.1 and §2.2: models.
 
-/// Cases of files; what the list does not say, scans are told from the rest by name: the rest was modelled by
-/// people.
+/// The scans among the cases with files; the others were modelled.
 constexpr const char* kScans[] = {"dragon",           "bunny",        "happy-buddha",     "lucy",
                                   "armadillo",        "asian-dragon", "nefertiti",        "horse",
                                   "laurana",          "dragon-res2",  "rocker-arm",       "elephant",
@@ -101,11 +92,10 @@ void count_models(const MeasurementInput& input, std::vector<MeasuredRow>& rows)
 struct Operations {
   std::size_t additions = 0, multiplications = 0, divisions = 0, roots = 0, lookups = 0;
 };
-/// What the counted numbers below did; one thread runs them.
+/// Operations of the numbers below, which one thread uses.
 Operations g_operations;
 
-/// A number that counts what is done with it. Signs, rounding down and comparisons are no arithmetic in the
-/// thesis's count.
+/// A number that counts its operations. The thesis does not count signs, rounding down and comparisons.
 template <class Base>
 struct Counted {
   Base value;
@@ -126,28 +116,25 @@ using Real = Counted<float>;
 
 Real root(Real a) { return ++g_operations.roots, Real{std::sqrt(a.value)}; }
 
-/// Equations 4.3 to 4.7 as they are printed, two quotients by one sum: a division and a product each.
-std::uint16_t pack_as_printed(const Normal& n) {
+/// Packs by equations 4.3 to 4.7 as printed, with a division and a product for each of two quotients; or
+/// divides 126 by the sum first, like octant_slots::project() without the third component, which a code that
+/// rounds down does not use.
+std::uint16_t pack_counted(const Normal& n, bool as_printed) {
   const Real x{std::fabs(n[0])}, y{std::fabs(n[1])}, z{std::fabs(n[2])}, levels{126.0f};
   const Real sum = x + y + z;
-  const Real a = x / sum * levels, b = y / sum * levels;
+  Real a, b;
+  if (as_printed) {
+    a = x / sum * levels, b = y / sum * levels;
+  } else {
+    const Real scale = levels / sum;
+    a = x * scale, b = y * scale;
+  }
   const std::uint32_t negative =
       std::uint32_t(n[0] < 0) << 15 | std::uint32_t(n[1] < 0) << 14 | std::uint32_t(n[2] < 0) << 13;
   return std::uint16_t(negative |
                        octant_slots::fold(std::uint32_t(int(a.value)), std::uint32_t(int(b.value))));
 }
-/// Divides 126 by the sum first, as octant_slots::project() has it, less the third component, which a
-/// code that rounds down does not use.
-std::uint16_t pack_by_one_division(const Normal& n) {
-  const Real x{std::fabs(n[0])}, y{std::fabs(n[1])}, z{std::fabs(n[2])};
-  const Real scale = Real{126.0f} / (x + y + z);
-  const Real a = x * scale, b = y * scale;
-  const std::uint32_t negative =
-      std::uint32_t(n[0] < 0) << 15 | std::uint32_t(n[1] < 0) << 14 | std::uint32_t(n[2] < 0) << 13;
-  return std::uint16_t(negative |
-                       octant_slots::fold(std::uint32_t(int(a.value)), std::uint32_t(int(b.value))));
-}
-/// Equations 4.9 to 4.13; the weight from the table, or computed by eq. 4.10.
+/// Unpacks by equations 4.9 to 4.13, with the weight from the table or by eq. 4.10.
 Normal unpack_counted(std::uint16_t code, bool table) {
   const octant_slots::Components at = octant_slots::unfold(code);
   const Real a{float(at.a)}, b{float(at.b)}, c = Real{127.0f} - a - b;
@@ -168,9 +155,9 @@ Normal unpack_counted(std::uint16_t code, bool table) {
 constexpr const char* kOperations[] = {"pack, quotients as printed", "pack, one division", "unpack, table",
                                        "unpack, weight computed"};
 
-/// The operations of one call, the same for all that were tried, and how many results are not those of the
-/// code that is in use. That code's own functions cannot be run on counted numbers: they work on the bits of
-/// floats, so that loops over them become vector code. These here are transcribed, and held against it.
+/// Counts the operations of one call, and the results that differ from those of the code in use. That code's
+/// own functions cannot be run on counted numbers: they work on the bits of floats, so that loops over them
+/// become vector code. The transcriptions above are compared with it.
 void count_operations(const MeasurementInput& input, std::vector<MeasuredRow>& rows) {
   const std::vector<Normal> normals = random_normals(200'000, input.seed);
   for (std::size_t which = 0; which < std::size(kOperations); ++which) {
@@ -187,8 +174,7 @@ void count_operations(const MeasurementInput& input, std::vector<MeasuredRow>& r
     g_operations = {};
     if (which < 2) {
       for (const Normal& normal : normals) {
-        const std::uint16_t code = which == 0 ? pack_as_printed(normal) : pack_by_one_division(normal);
-        after_call(code != ThesisNormalCode::pack(normal));
+        after_call(pack_counted(normal, which == 0) != ThesisNormalCode::pack(normal));
       }
     } else {
       for (std::uint32_t code = 0; code < 65'536; ++code) {
@@ -213,7 +199,7 @@ void count_operations(const MeasurementInput& input, std::vector<MeasuredRow>& r
 
 // ---- §4.1: the look-up table against the square root.
 
-/// The weight computed where the table is read; all else is ThesisNormalCode's.
+/// ThesisNormalCode::unpack() with a computed weight instead of the table.
 Normal unpack_by_root(std::uint16_t code) {
   const octant_slots::Components at = octant_slots::unfold(code);
   const auto a = float(int(at.a)), b = float(int(at.b)), c = float(127 - int(at.a) - int(at.b));
@@ -225,13 +211,12 @@ Normal unpack_by_root(std::uint16_t code) {
 }
 
 using UnpackLoop = void (*)(const std::uint16_t*, Normal*, std::size_t);
-/// Over an array: a compiler makes vector code of it where it can.
+/// Unpacks an array, which a compiler vectorises if it can.
 template <Normal (*unpack)(std::uint16_t)>
 void over_array(const std::uint16_t* from, Normal* to, std::size_t n) {
   for (std::size_t i = 0; i < n; ++i) to[i] = unpack(from[i]);
 }
-/// One by one, each code depending on the normal before it, as it is where a normal decides what is done
-/// next.
+/// Unpacks one by one; each code depends on the normal before it.
 template <Normal (*unpack)(std::uint16_t)>
 void one_by_one(const std::uint16_t* from, Normal* to, std::size_t n) {
   std::uint16_t turned = 0;
@@ -255,39 +240,34 @@ void time_lookup(const MeasurementInput& input, std::vector<MeasuredRow>& rows) 
   for (const Normal& normal : random_normals(kCodes, input.seed))
     codes.push_back(ThesisNormalCode::pack(normal));
   std::vector<Normal> normals(kCodes);
-  std::vector<Contender> contenders;
+  std::vector<std::function<double()>> work;
   for (const UnpackLoop loop : kLoops)
-    contenders.push_back({.run =
-                              [&, loop] {
-                                return timed([&] {
-                                  for (int round = 0; round < kRounds; ++round)
-                                    loop(codes.data(), normals.data(), codes.size());
-                                });
-                              },
-                          .budget_seconds = 1e9,
-                          .repetitions = int(input.parameters.number("repetitions")),
-                          .seconds = {}});
-  race(contenders);
+    work.push_back([&, loop] {
+      return timed([&] {
+        for (int round = 0; round < kRounds; ++round) loop(codes.data(), normals.data(), codes.size());
+      });
+    });
+  const auto seconds = race(work, int(input.parameters.number("repetitions")));
   double largest = 0.0;
   for (std::uint32_t code = 0; code < 65'536; ++code) {
     const Normal a = ThesisNormalCode::unpack(std::uint16_t(code)), b = unpack_by_root(std::uint16_t(code));
     for (int axis = 0; axis < 3; ++axis) largest = std::max(largest, double(std::abs(a[axis] - b[axis])));
   }
-  for (std::size_t i = 0; i < contenders.size(); ++i) {
+  for (std::size_t i = 0; i < seconds.size(); ++i) {
     const double scale = 1e9 / (double(kCodes) * kRounds);
-    MeasuredRow row{"lookup", kUnpackings[i]};
-    row.values = {{"ns", scale * median(contenders[i].seconds)},
-                  {"ns_shortest", scale * std::ranges::min(contenders[i].seconds)},
-                  {"ratio", median(contenders[i | 1].seconds) / median(contenders[i].seconds)},
-                  {"largest_difference", largest}};
-    rows.push_back(std::move(row));
+    rows.push_back({"lookup",
+                    kUnpackings[i],
+                    {{"ns", scale * median(seconds[i])},
+                     {"ns_shortest", scale * std::ranges::min(seconds[i])},
+                     {"ratio", median(seconds[i | 1]) / median(seconds[i])},
+                     {"largest_difference", largest}}});
   }
 }
 
 // ---- §3.1: the size of blocks.
 
-/// The sum over all active voxels of their active neighbours' values, in whole units of 2⁻²⁰ voxel so that no
-/// order of summing matters; with how many there were.
+/// The sum over all active voxels of their active neighbours' values, in whole units of 2⁻²⁰ voxel so that
+/// the order of the sum does not matter; and the number of these neighbours.
 struct NeighbourSum {
   std::int64_t sum = 0;
   std::size_t neighbours = 0;
@@ -305,8 +285,18 @@ struct BlockResult {
   NeighbourSum sum;
   double bytes = 0.0;
 };
+/// `visit` adds the neighbours of all voxels to a sum.
+template <class Visit>
+BlockResult repeated(double bytes, int repetitions, Visit&& visit) {
+  BlockResult result{.seconds = {}, .sum = {}, .bytes = bytes};
+  for (int i = 0; i < repetitions; ++i) {
+    result.sum = {};
+    result.seconds.push_back(timed([&] { visit(result.sum); }));
+  }
+  return result;
+}
 
-/// A tree of the usual shape but for its leaves.
+/// A tree of the usual shape with other leaves.
 template <int kLog2>
 BlockResult through_tree(const openvdb::FloatGrid& source, double scale, int repetitions) {
   using Tree = typename openvdb::tree::Tree4<float, 5, 4, kLog2>::Type;
@@ -315,20 +305,14 @@ BlockResult through_tree(const openvdb::FloatGrid& source, double scale, int rep
     openvdb::tree::ValueAccessor<Tree> accessor(tree);
     for (auto value = source.cbeginValueOn(); value; ++value) accessor.setValue(value.getCoord(), *value);
   }
-  BlockResult result;
-  result.bytes = double(tree.memUsage());
-  for (int i = 0; i < repetitions; ++i) {
-    result.sum = {};
-    result.seconds.push_back(timed([&] {
-      const openvdb::tree::ValueAccessor<const Tree> accessor(tree);
-      for (auto value = tree.cbeginValueOn(); value; ++value)
-        for (const auto& [x, y, z] : kSteps) {
-          float found = 0.0f;
-          if (accessor.probeValue(value.getCoord().offsetBy(x, y, z), found)) result.sum.add(found, scale);
-        }
-    }));
-  }
-  return result;
+  return repeated(double(tree.memUsage()), repetitions, [&](NeighbourSum& sum) {
+    const openvdb::tree::ValueAccessor<const Tree> accessor(tree);
+    for (auto value = tree.cbeginValueOn(); value; ++value)
+      for (const auto& [x, y, z] : kSteps) {
+        float found = 0.0f;
+        if (accessor.probeValue(value.getCoord().offsetBy(x, y, z), found)) sum.add(found, scale);
+      }
+  });
 }
 
 struct CoordHash {
@@ -340,28 +324,24 @@ struct CoordHash {
   }
 };
 
-/// Voxel by voxel in a hash table: no blocks at all. They are visited in the order of the source's leaves,
-/// like those of a tree.
+/// A hash table of voxels, without blocks. They are visited in the order of the source's leaves, like those
+/// of a tree.
 BlockResult through_hash(const openvdb::FloatGrid& source, double scale, int repetitions) {
   std::unordered_map<openvdb::Coord, float, CoordHash> voxels;
   voxels.reserve(source.activeVoxelCount());
   for (auto value = source.cbeginValueOn(); value; ++value) voxels.emplace(value.getCoord(), *value);
-  BlockResult result;
-  result.bytes = double(voxels.size()) * (sizeof(std::pair<openvdb::Coord, float>) + 2 * sizeof(void*)) +
-                 double(voxels.bucket_count()) * sizeof(void*);
-  for (int i = 0; i < repetitions; ++i) {
-    result.sum = {};
-    result.seconds.push_back(timed([&] {
-      for (auto value = source.cbeginValueOn(); value; ++value)
-        for (const auto& [x, y, z] : kSteps)
-          if (const auto found = voxels.find(value.getCoord().offsetBy(x, y, z)); found != voxels.end())
-            result.sum.add(found->second, scale);
-    }));
-  }
-  return result;
+  const double bytes =
+      double(voxels.size()) * (sizeof(std::pair<openvdb::Coord, float>) + 2 * sizeof(void*)) +
+      double(voxels.bucket_count()) * sizeof(void*);
+  return repeated(bytes, repetitions, [&](NeighbourSum& sum) {
+    for (auto value = source.cbeginValueOn(); value; ++value)
+      for (const auto& [x, y, z] : kSteps)
+        if (const auto found = voxels.find(value.getCoord().offsetBy(x, y, z)); found != voxels.end())
+          sum.add(found->second, scale);
+  });
 }
 
-/// One array over the box of the active voxels, with a NaN where there is none.
+/// One array over the box of the active voxels, NaN elsewhere.
 BlockResult through_array(const openvdb::FloatGrid& source, double scale, int repetitions) {
   openvdb::CoordBBox box = source.evalActiveVoxelBoundingBox();
   box.expand(1);
@@ -374,23 +354,17 @@ BlockResult through_array(const openvdb::FloatGrid& source, double scale, int re
   std::vector<float> values(std::size_t(size.x()) * std::size_t(size.y()) * std::size_t(size.z()),
                             std::nanf(""));
   for (auto value = source.cbeginValueOn(); value; ++value) values[at(value.getCoord())] = *value;
-  BlockResult result;
-  result.bytes = double(values.size() * sizeof(float));
-  for (int i = 0; i < repetitions; ++i) {
-    result.sum = {};
-    result.seconds.push_back(timed([&] {
-      for (int x = box.min().x() + 1; x < box.max().x(); ++x)
-        for (int y = box.min().y() + 1; y < box.max().y(); ++y)
-          for (int z = box.min().z() + 1; z < box.max().z(); ++z) {
-            const openvdb::Coord here(x, y, z);
-            if (std::isnan(values[at(here)])) continue;
-            for (const auto& [dx, dy, dz] : kSteps)
-              if (const float found = values[at(here.offsetBy(dx, dy, dz))]; !std::isnan(found))
-                result.sum.add(found, scale);
-          }
-    }));
-  }
-  return result;
+  return repeated(double(values.size() * sizeof(float)), repetitions, [&](NeighbourSum& sum) {
+    for (int x = box.min().x() + 1; x < box.max().x(); ++x)
+      for (int y = box.min().y() + 1; y < box.max().y(); ++y)
+        for (int z = box.min().z() + 1; z < box.max().z(); ++z) {
+          const openvdb::Coord here(x, y, z);
+          if (std::isnan(values[at(here)])) continue;
+          for (const auto& [dx, dy, dz] : kSteps)
+            if (const float found = values[at(here.offsetBy(dx, dy, dz))]; !std::isnan(found))
+              sum.add(found, scale);
+        }
+  });
 }
 
 struct BlockKind {
@@ -414,10 +388,8 @@ void time_blocks(const MeasurementInput& input, std::vector<MeasuredRow>& rows) 
   if (std::ranges::none_of(kBlocks, [&](const BlockKind& kind) { return input.wants("blocks", kind.label); }))
     return;
   const LoadedCase model = input.tables.load(input.parameters.text("case"), input.context);
-  const LevelSet level_set = voxelize(model.mesh,
-                                      {.chosen = choose(input.tables.voxelizers, "hermesh"),
-                                       .resolution = input.parameters.number("resolution")},
-                                      input.context);
+  const LevelSet level_set =
+      voxelized(model.mesh, {.resolution = input.parameters.number("resolution")}, input);
   const openvdb::FloatGrid& grid = *level_set.grid().grid;
   const double scale = double(1 << 20) / level_set.voxel_size();
   const int repetitions = std::max(1, int(input.parameters.number("repetitions")) / 3);
@@ -442,6 +414,8 @@ void time_blocks(const MeasurementInput& input, std::vector<MeasuredRow>& rows) 
   }
 }
 
+}  // namespace
+
 std::vector<MeasuredRow> measure_arithmetic(const MeasurementInput& input) {
   std::vector<MeasuredRow> rows;
   count_models(input, rows);
@@ -449,80 +423,6 @@ std::vector<MeasuredRow> measure_arithmetic(const MeasurementInput& input) {
   time_lookup(input, rows);
   time_blocks(input, rows);
   return rows;
-}
-
-}  // namespace
-
-Measurement arithmetic_measurement() {
-  return {.name = "arithmetic",
-          .summary =
-              "shared points, the state of models, the normal code's operations and table, sizes of blocks",
-          .parameters =
-              {{"case", "dragon", "model of the level set whose neighbours are read", case_choices()},
-               {"resolution", "400", "voxels along its longest side", {}, 8, 5000},
-               {"repetitions", "15", "timed runs; a third as many of what reads neighbours", {}, 1, 1000}},
-          .tables = {{"model",
-                      "models of the case list whose files are at hand (§2.1, §2.2)",
-                      "model",
-                      {{"scanned", "scanned", "1 for a scan, 0 for what somebody modelled"},
-                       {"points", "points", "that are shared"},
-                       {"corners", "corners", "of all polygons"},
-                       {"shared_bytes", "shared [B]", "12 a point and 4 a corner"},
-                       {"unshared_bytes", "unshared [B]", "12 a corner"},
-                       {"saved_share", "saved", "what sharing saves, over what there would be without"},
-                       {"point_bytes_share", "of point data",
-                        "bytes of shared points, or of any attribute of points, over those a corner"},
-                       {"closed", "closed", "1 where no edge is a boundary"},
-                       {"manifold", "manifold", "1 where no edge and no vertex is non-manifold"},
-                       {"oriented", "oriented", "1 where no edge is flipped"},
-                       {"open_edges", "open", "boundary edges"},
-                       {"non_manifold_edges", "nm e", "non-manifold edges"},
-                       {"non_manifold_vertices", "nm v", "non-manifold vertices"},
-                       {"flipped_edges", "flipped", "inconsistently oriented edges"}}},
-                     {"share",
-                      "shares of these models",
-                      "models",
-                      {{"models", "models", "how many"},
-                       {"closed_share", "closed", "their share that is closed"},
-                       {"manifold_share", "manifold", "manifold"},
-                       {"oriented_share", "oriented", "consistently oriented"},
-                       {"clean_share", "all three", "closed, manifold and oriented"}}},
-                     {"operations",
-                      "operations of the normal code, counted as it runs (§4.1)",
-                      "what",
-                      {{"additions", "+", "additions and subtractions"},
-                       {"printed_additions", "printed", "those that the thesis counts"},
-                       {"multiplications", "·", "multiplications"},
-                       {"printed_multiplications", "printed",
-                        "those that the thesis counts; for the weight 3 and 3 for the components"},
-                       {"divisions", "/", "divisions"},
-                       {"printed_divisions", "printed", "those that the thesis counts, or that eq. 4.10 has"},
-                       {"roots", "√", "square roots"},
-                       {"lookups", "look-ups", "in the table of weights"},
-                       {"tried", "tried", "normals or codes"},
-                       {"differing", "differing",
-                        "of these, whose result is not that of the code in use to the last bit"}}},
-                     {"lookup",
-                      "time to unpack a normal, one thread (§4.1)",
-                      "weight",
-                      {{"ns", "ns", "median a normal"},
-                       {"ns_shortest", "min [ns]", "shortest"},
-                       {"ratio", "times as fast", "as the square root in the same loop"},
-                       {"largest_difference", "difference",
-                        "largest between a component by the table and by the root"}}},
-                     {"blocks",
-                      "time to read a neighbour of every active voxel, one thread (§3.1)",
-                      "storage",
-                      {{"side", "side", "samples along a block; 0 for one array over all"},
-                       {"block_kib", "block [KiB]", "values of one block"},
-                       {"mebibytes", "MiB", "of the whole"},
-                       {"active", "active voxels", "of which six neighbours each are read"},
-                       {"ns", "ns", "median a neighbour"},
-                       {"ns_shortest", "min [ns]", "shortest"},
-                       {"level_1_kib", "L1 [KiB]",
-                        "first-level data cache as the system states it; 0 where it does not"},
-                       {"level_2_kib", "L2 [KiB]", "second-level cache"}}}},
-          .measure = measure_arithmetic};
 }
 
 }  // namespace hermesh

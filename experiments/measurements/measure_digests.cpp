@@ -1,10 +1,8 @@
-// What the program makes, as digests: proves that a change left every byte as it was, and that neither the
-// number of threads nor the level of vector code matters. `hermesh compare` sets two runs beside each other.
+// Digests of the program's outputs: show that a change preserves every byte, and that neither the number of
+// threads nor the SIMD instruction set matters. `hermesh compare` compares two runs.
 #include <tbb/global_control.h>
 
-#include <algorithm>
 #include <cstdlib>
-#include <sstream>
 
 #include "algorithms/fracture/cutter_words.h"
 #include "algorithms/hermite/solids.h"
@@ -13,26 +11,22 @@
 #include "algorithms/variants.h"
 #include "algorithms/voxelization/outputs/volume_outputs.h"
 #include "experiments/fracture/fracture_run.h"
-#include "experiments/harness/cell.h"
-#include "experiments/harness/digest.h"
-#include "experiments/harness/run_cells.h"
+#include "experiments/harness/facts.h"
 #include "experiments/measurements/measurements.h"
-#include "experiments/pipeline.h"
 
 namespace hermesh {
 namespace {
 
 using Given = GivenOptions;
 
-/// How often the work of a cell is done: once for the digest, and then in each of these ways for the same
-/// digest.
+/// A setting in which the work must give the same digest.
 struct DigestWay {
   std::string name;
   int threads = 2;
   std::optional<SimdLevel> level = {};  ///< none: the highest
 };
 
-/// Sets the level of vector code for as long as it lives.
+/// Sets the SIMD level during its lifetime.
 class ChosenLevel {
  public:
   explicit ChosenLevel(const std::optional<SimdLevel>& level) {
@@ -48,8 +42,8 @@ class ChosenLevel {
   std::optional<std::string> before_;
 };
 
-/// Numbers of threads and levels of vector code change together, which tells as surely that all of them give
-/// the same in fewer runs.
+/// Numbers of threads and SIMD levels change together, which shows in fewer runs that all of them give the
+/// same.
 std::vector<DigestWay> digest_ways(const Options& parameters) {
   std::vector<std::optional<SimdLevel>> levels = {{}};
   if (parameters.is("simd", "all")) {
@@ -70,7 +64,7 @@ std::vector<DigestWay> digest_ways(const Options& parameters) {
   return result;
 }
 
-/// A number that is not the option's fallback and leads to other code or another result.
+/// Returns a number other than the fallback that leads to other code or another result.
 std::string other_number(const OptionSpec& spec) {
   const double usual = std::stod(spec.fallback);
   const double candidates[] = {3.0 * usual, spec.maximum > 1e6 ? 7.0 : 0.5, 0.5 * usual, spec.minimum};
@@ -80,8 +74,8 @@ std::string other_number(const OptionSpec& spec) {
   return spec.fallback;
 }
 
-/// The defaults, and each option by itself at its other choices, or at another number; with what it needs
-/// beside it.
+/// Returns the defaults, and each option by itself at its other choices or at another number, with the
+/// options that it requires.
 template <class Variant>
 std::vector<Given> variations(const Variant& variant) {
   std::vector<Given> result = {{}};
@@ -116,8 +110,7 @@ class Digests {
     std::vector<std::string> names = {choice};
     if (choice == "few") names = {"torus", "cad-part"};
     if (choice == "all") names = files();
-    std::istringstream resolutions(input_.parameters.text("resolutions"));
-    for (double resolution; resolutions >> resolution;)
+    for (const double resolution : numbers_in(input_.parameters.text("resolutions")))
       for (const std::string& name : names) {
         input_.context.progress(name + " at " + readable(resolution), 0.0);
         name_ = name, resolution_ = resolution;
@@ -142,7 +135,7 @@ class Digests {
     return names;
   }
 
-  /// Ours, and OpenVDB's where references are wanted.
+  /// Returns ours, and OpenVDB's if references are wanted.
   template <class Variant>
   std::vector<Variant> wanted(std::span<const Variant> ours, const std::vector<Variant>& all) const {
     std::vector<Variant> result(ours.begin(), ours.end());
@@ -151,7 +144,7 @@ class Digests {
   }
   bool references() const { return input_.parameters.is("references", "yes"); }
 
-  // Made when a row asks for them, so that a filter saves all the rest.
+  // Made when a row needs them, so that a filter saves the rest.
   const PolygonMesh& mesh() {
     RunContext child = child_context(input_.context, false);
     if (!mesh_) mesh_ = input_.tables.load(name_, child).mesh;
@@ -198,9 +191,7 @@ class Digests {
   void meshes() {
     for (const Extractor& extractor : wanted(our_extractors(), input_.tables.extractors)) {
       std::vector<Given> all = variations(extractor);
-      if (extractor.name == "manifold-dual-contouring") {
-        all.push_back({{"tolerance", "0"}});
-      }
+      if (extractor.name == "manifold-dual-contouring") all.push_back({{"tolerance", "0"}});
       if (extractor.name == "certified-octree") {
         all.push_back({{"tolerance", "1"}});
         all.push_back({{"flatness", "0.05"}});
@@ -222,7 +213,7 @@ class Digests {
         [&](RunContext& child) { return digest(sample_level_set(level_set(), 0.25 * voxel_size(), child)); });
   }
 
-  /// The model and itself, moved by a third of its size.
+  /// Combines the model with itself, moved by a third of its size.
   void solids() {
     for (const auto& [name, boolean] : {std::pair("union", Boolean::unite),
                                         {"intersection", Boolean::intersect},
@@ -275,7 +266,7 @@ class Digests {
           });
   }
 
-  /// The digest, or the sentence of what went wrong; in all ways the same.
+  /// Emits the digest or the error message, and settings in which it differs.
   void row(const std::string& what, const std::function<std::string(RunContext&)>& make) {
     const std::string label = name_ + ", " + what;
     if (!input_.wants("digests", label)) return;
@@ -306,25 +297,6 @@ class Digests {
 
 }  // namespace
 
-Measurement digests_measurement() {
-  std::vector<std::string> cases = case_choices();
-  cases.insert(cases.begin(), {"few", "all"});
-  return {.name = "digests",
-          .summary = "digests of all that the program makes, in every way of making it",
-          .parameters = {{"cases", "few", "two small ones, all models, or one case", cases},
-                         {"resolutions", "50", "voxels along the longest side", {"50", "200", "50 200"}},
-                         {"threads", "1 2 7", "numbers of threads that must give the same", {"2", "1 2 7"}},
-                         {"simd", "all", "levels of vector code that must give the same", {"all", "highest"}},
-                         {"references", "no", "whether OpenVDB's are among them", {"no", "yes"}}},
-          .tables = {{"digests",
-                      "what was made",
-                      "case, what",
-                      {{"resolution", "voxels", "along the longest side"},
-                       {"digest", "digest", "of what was made, or the sentence of why nothing was"},
-                       {"ways", "ways", "numbers of threads and levels of vector code that gave the same"}},
-                      true,
-                      true}},
-          .measure = [](const MeasurementInput& input) { return Digests(input).run(); }};
-}
+std::vector<MeasuredRow> measure_digests(const MeasurementInput& input) { return Digests(input).run(); }
 
 }  // namespace hermesh

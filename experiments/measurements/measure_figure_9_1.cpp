@@ -1,17 +1,10 @@
-// Figures 9.1 and 9.2 of the thesis: slices through the level set of a model that intersects itself, and
-// through one whose interior band fills the solid. Rows count what the slices show.
-#include <algorithm>
+// Figures 9.1 and 9.2 of the thesis: slices through the level set of a self-intersecting model, and through
+// one whose interior band fills the solid.
 #include <cmath>
-#include <optional>
 
 #include "algorithms/core/level_set_grid.h"
-#include "experiments/cases/cases.h"
-#include "experiments/harness/cell.h"
-#include "experiments/harness/run_cells.h"
-#include "experiments/measure.h"
 #include "experiments/measurements/measurements.h"
 #include "experiments/pictures/slice.h"
-#include "experiments/pipeline.h"
 #include "reference/level_set_judge.h"
 
 namespace hermesh {
@@ -29,20 +22,11 @@ struct CleanUpWay {
   GivenOptions options = {};
 };
 
-/// The thesis's voxelizer without its clean-up where the table has a switch for it, with it, ours, and the
-/// oracle.
-std::vector<CleanUpWay> clean_up_ways(std::span<const Voxelizer> voxelizers) {
-  std::vector<CleanUpWay> result;
-  for (const OptionSpec& option : find_variant(voxelizers, "thesis").options)
-    if (option.name == "clean_up" || option.name == "clean-up")
-      for (const std::string& choice : option.choices)
-        if (choice != option.fallback)
-          result.push_back({"thesis, " + option.name + "=" + choice, "thesis", {{option.name, choice}}});
-  result.push_back({"thesis", "thesis"});
-  result.push_back({"hermesh", "hermesh"});
-  result.push_back({"exact", "exact", {{"signs", "winding-number"}}});
-  return result;
-}
+/// The thesis's voxelizer without and with its clean-up, ours, and the oracle.
+const std::vector<CleanUpWay> kCleanUpWays = {{"thesis, clean_up=false", "thesis", {{"clean_up", "false"}}},
+                                              {"thesis", "thesis"},
+                                              {"hermesh", "hermesh"},
+                                              {"exact", "exact", {{"signs", "winding-number"}}}};
 
 struct SideCounts {
   std::size_t active_outside = 0, active_inside = 0, inside = 0;
@@ -57,10 +41,10 @@ SideCounts count_sides(const LevelSet& level_set) {
   return counts;
 }
 
-/// What a level set has otherwise than the oracle's, sample by sample.
+/// Samples at which a level set differs from the oracle's.
 struct Differences {
-  std::size_t buried = 0;   ///< active here, and there inside beyond the band
-  std::size_t missing = 0;  ///< active there, and inactive here
+  std::size_t buried = 0;   ///< active, while the oracle's is inside beyond the band
+  std::size_t missing = 0;  ///< inactive, while the oracle's is active
   std::size_t wrong = 0;    ///< with the other sign, farther than 1e-3 voxel from the surface
 };
 Differences compare(const LevelSet& level_set, const LevelSet& truth) {
@@ -109,7 +93,7 @@ class Figure91Measurer {
             .interior_band = interior};
   }
 
-  /// The slice across the model's shortest side, which shows most of it.
+  /// Returns the slice across the model's shortest side, which shows most of it.
   SliceFrame widest_slice(const LevelSet& level_set, const PolygonMesh& mesh) const {
     int axis = 0;
     bounds(mesh).size().minCoeff(&axis);
@@ -117,21 +101,22 @@ class Figure91Measurer {
   }
 
   void clean_up(const std::string& name) {
-    const std::vector<CleanUpWay> all = clean_up_ways(input_.tables.voxelizers);
-    if (std::ranges::none_of(
-            all, [&](const CleanUpWay& way) { return input_.wants("clean-up", label_of(name, way.label)); }))
+    if (std::ranges::none_of(kCleanUpWays, [&](const CleanUpWay& way) {
+          return input_.wants("clean-up", label_of(name, way.label));
+        }))
       return;
+    const CleanUpWay& oracle = kCleanUpWays.back();
     const LoadedCase model = input_.tables.load(name, input_.context);
-    const LevelSet truth = voxelize(model.mesh, recipe(all.back(), kUsualBand), input_.context);
+    const LevelSet truth = voxelize(model.mesh, recipe(oracle, kUsualBand), input_.context);
     const SliceFrame frame = widest_slice(truth, model.mesh);
     PanelSheet sheet;
-    for (const CleanUpWay& way : all) {
+    for (const CleanUpWay& way : kCleanUpWays) {
       if (!input_.wants("clean-up", label_of(name, way.label))) continue;
       input_.context.check();
       RunContext child = child_context(input_.context, false);
       LevelSet level_set = truth;
       std::optional<double> seconds;
-      if (way.name != all.back().name)
+      if (way.name != oracle.name)
         seconds = timed([&] { level_set = voxelize(model.mesh, recipe(way, kUsualBand), child); });
       add_clean_up_row(label_of(name, way.label), model, level_set, truth, seconds);
       if (pixels_ == 0) continue;
@@ -219,8 +204,8 @@ class Figure91Measurer {
         {"seconds", seconds}};
     const DistanceOracle surface(triangles_in_voxels(model.mesh, level_set.voxel_size()));
     const WindingOracle winding(surface);
-    // Of a voxel on the wrong side the other side's band would be held against it; both are as wide as the
-    // wider one.
+    // A voxel on the wrong side is compared with the band of the other side; both are as wide as the wider
+    // one.
     const VoxelSelection selection{band, std::int64_t(input_.parameters.number("samples")), input_.seed};
     const DistanceTruth truth(surface, winding, selection, input_.context);
     const DistanceReport report = truth.judge(level_set, model.mesh.origin, kUsualBand, band, input_.context);
@@ -243,52 +228,10 @@ class Figure91Measurer {
   std::vector<MeasuredRow> rows_;
 };
 
-std::vector<MeasuredRow> measure_figure_9_1(const MeasurementInput& input) {
-  return Figure91Measurer(input).run();
-}
-
 }  // namespace
 
-Measurement figure_9_1_measurement() {
-  const MeasuredColumn origin{"origin", "origin", "where the model comes from"};
-  return {
-      .name = "figure-9-1",
-      .summary =
-          "slices through level sets: clean-up of self-intersections, and the filled interior (figures 9.1 "
-          "and 9.2)",
-      .parameters =
-          {{"resolution", "200", "voxels along the longest side", {}, 8, 1000},
-           {"filled_case", "armadillo", "model of figure 9.2", case_choices()},
-           {"slice", "0.5", "where the slice lies along the shortest side, as a share of the box", {}, 0, 1},
-           {"samples", "50000", "voxels whose distances are judged", {}, 100, 1e8},
-           {"pixels", "420", "width of a picture; 0 draws none", {}, 0, 4000}},
-      .tables =
-          {{"clean-up",
-            "models that intersect themselves (figure 9.1)",
-            "model, voxelizer",
-            {origin,
-             {"active", "active", "active voxels"},
-             {"active_inside", "inside", "of these, inside"},
-             {"active_outside", "outside", "of these, outside"},
-             {"buried", "buried", "active voxels that the oracle has inside the solid, beyond the band"},
-             {"missing", "missing", "voxels that the oracle has active and this grid has not"},
-             {"wrong_signs", "wrong signs", "voxels active in either, more than 1e-3 voxel from the surface"},
-             {"mebibytes", "MiB", "the grid's tree"},
-             {"seconds", "time [s]", "of one run"}}},
-           {"fill",
-            "the interior band expanded (figure 9.2)",
-            "model, voxelizer, interior band",
-            {origin,
-             {"interior_band", "band [vx]", "width of the interior band"},
-             {"active_inside", "active inside", "active voxels inside"},
-             {"inside", "inside", "all voxels inside"},
-             {"share_filled", "share", "the one over the other"},
-             {"compared", "judged", "active voxels whose distance was held against the oracle's"},
-             {"rms", "rms [vx]", "root mean square error of these distances"},
-             {"largest", "max [vx]", "largest error"},
-             {"missing", "missing", "voxels among those drawn that should be active and are not"},
-             {"seconds", "time [s]", "of one run"}}}},
-      .measure = measure_figure_9_1};
+std::vector<MeasuredRow> measure_figure_9_1(const MeasurementInput& input) {
+  return Figure91Measurer(input).run();
 }
 
 }  // namespace hermesh

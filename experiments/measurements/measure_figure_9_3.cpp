@@ -1,23 +1,17 @@
-// Figure 9.3 of the thesis: a cloud of polygons, its level set, and the fog volumes that are made of it
-// (§5.6).
-#include <algorithm>
+// Figure 9.3 of the thesis: a cloud of polygons, its level set and its fog volumes (§5.6).
 #include <cmath>
 
 #include "algorithms/core/level_set_grid.h"
 #include "algorithms/voxelization/hermesh_voxelizer.h"
 #include "algorithms/voxelization/outputs/volume_outputs.h"
-#include "experiments/cases/cases.h"
-#include "experiments/harness/run_cells.h"
-#include "experiments/measure.h"
 #include "experiments/measurements/measurements.h"
 #include "experiments/pictures/fog.h"
 #include "experiments/pictures/slice.h"
-#include "experiments/pipeline.h"
 
 namespace hermesh {
 namespace {
 
-/// A border of the fog: how many voxels wide its ramp is, and on which side of the surface it lies.
+/// The ramp at the border of the fog: its width in voxels and its side of the surface.
 struct Border {
   double voxels;
   bool both_sides;
@@ -49,8 +43,7 @@ Cloud make_cloud(const PolygonMesh& mesh, const Border& border, double voxel_siz
   return cloud;
 }
 
-/// Sums over a fog, and what of it is not as §5.6 says: 1 inside beyond the ramp, 0 outside of it, evenly
-/// between.
+/// Sums over a fog, and its deviations from §5.6: 1 inside beyond the ramp, 0 outside of it, linear between.
 MeasuredRow describe(const std::string& label, const Border& border, const Cloud& cloud) {
   const openvdb::FloatGrid& fog = *cloud.fog.grid().grid;
   const openvdb::FloatGrid& sdf = *cloud.level_set.grid().grid;
@@ -93,6 +86,8 @@ MeasuredRow describe(const std::string& label, const Border& border, const Cloud
     row.broken.push_back("the ramp is steeper than its width says");
   return row;
 }
+
+}  // namespace
 
 std::vector<MeasuredRow> measure_figure_9_3(const MeasurementInput& input) {
   std::vector<MeasuredRow> rows;
@@ -151,32 +146,6 @@ std::vector<MeasuredRow> measure_figure_9_3(const MeasurementInput& input) {
   sheet.columns = 3;
   draw_panels(input.out / ("figure-9-3-" + readable(resolution) + ".png"), std::move(sheet));
   return rows;
-}
-
-}  // namespace
-
-Measurement figure_9_3_measurement() {
-  return {
-      .name = "figure-9-3",
-      .summary = "a cloud of polygons as fog volumes with borders of several widths (figure 9.3)",
-      .parameters = {{"resolution", "200", "voxels along the longest side", {}, 16, 1000},
-                     {"puffs", "40", "spheres of the cloud", {}, 1, 1000},
-                     {"spread", "5", "side of the cube of their centres, in radii", {}, 0, 100},
-                     {"optical_depth", "40", "of fog of density 1 as long as the cloud", {}, 0.01, 10000},
-                     {"pixels", "400", "width of a picture; 0 draws none", {}, 0, 4000}},
-      .tables = {{"fog",
-                  "fog volumes of the same cloud",
-                  "ramp",
-                  {{"triangles", "triangles", "of the cloud"},
-                   {"border", "band [vx]", "width of the band that the ramp lies over, on each of its sides"},
-                   {"full", "voxels of 1", "voxels of density 1"},
-                   {"partial", "on the ramp", "voxels of a density between"},
-                   {"mass", "mass", "sum of the densities, cubic world units"},
-                   {"solid", "solid", "volume of the voxels inside the level set, cubic world units"},
-                   {"steepest", "steepest", "largest difference of neighbouring densities"},
-                   {"wrong", "wrong", "voxels whose density is not that of the ramp at their distance"},
-                   {"seconds", "time [s]", "to make level set and fog, one run"}}}},
-      .measure = measure_figure_9_3};
 }
 
 }  // namespace hermesh

@@ -1,28 +1,13 @@
 // Figures 9.4 and 9.5 of the thesis: a statue as a level set of 200 and of 1586 voxels.
-#include <algorithm>
 #include <array>
-#include <cmath>
 
-#include "experiments/cases/cases.h"
-#include "experiments/harness/cell.h"
-#include "experiments/harness/level_set_facts.h"
-#include "experiments/harness/run_cells.h"
-#include "experiments/measure.h"
+#include "experiments/harness/facts.h"
 #include "experiments/measurements/measurements.h"
-#include "experiments/pictures/render.h"
-#include "experiments/pipeline.h"
 
 namespace hermesh {
 namespace {
 
 constexpr std::array<const char*, 2> kVoxelizers = {"thesis", "hermesh"};
-
-/// The Thai Statue where its file is at hand, else the stand-in that the parameter names.
-LoadedCase load_statue(const MeasurementInput& input) {
-  return input.tables.load(
-      is_at_hand("thai-statue", input.context) ? "thai-statue" : input.parameters.text("stand_in"),
-      input.context);
-}
 
 class Figure94Measurer {
  public:
@@ -36,7 +21,9 @@ class Figure94Measurer {
     };
     std::erase_if(resolutions, [&](double resolution) { return !wanted(resolution); });
     if (resolutions.empty()) return {};
-    statue_ = load_statue(input_);
+    const bool available = is_at_hand("thai-statue", input_.context);
+    statue_ =
+        input_.tables.load(available ? "thai-statue" : input_.parameters.text("stand_in"), input_.context);
     reference_ = to_mesh_file(statue_.mesh);
     for (const double resolution : resolutions)
       for (const char* name : kVoxelizers)
@@ -69,7 +56,7 @@ class Figure94Measurer {
                   {"active", level_set.active_voxels()},
                   {"seconds", seconds},
                   {"triangles", mesh.triangle_count()}};
-    validation::JudgeOptions options;
+    validation::CheckOptions options;
     options.self_intersections = options.libraries = false;
     options.reference = &reference_;
     options.solid_samples = 0;
@@ -82,7 +69,7 @@ class Figure94Measurer {
     }
     row.values["open"] = report.boundary_edges;
     row.values["components"] = report.components;
-    // Two printed rows of table 9.1 belong to the figures.
+    // Two published rows of table 9.1 belong to the figures.
     if (resolution == 200) row.values["printed_seconds"] = 4.09;
     if (resolution == 1586) row.values["printed_seconds"] = 19.93;
     if (input_.parameters.number("pixels") > 0)
@@ -114,37 +101,10 @@ class Figure94Measurer {
   std::vector<MeasuredRow> rows_;
 };
 
-std::vector<MeasuredRow> measure_figure_9_4(const MeasurementInput& input) {
-  return Figure94Measurer(input).run();
-}
-
 }  // namespace
 
-Measurement figure_9_4_measurement() {
-  return {.name = "figure-9-4",
-          .summary = "a statue as a level set at two resolutions, rendered (figures 9.4 and 9.5)",
-          .parameters = {{"coarse", "200", "voxels along the longest side, figure 9.4", {}, 8, 20000},
-                         {"fine", "1586", "the same, figure 9.5", {}, 8, 20000},
-                         {"stand_in", "dragon", "model where xyzrgb_statuette.ply is not in the data folder",
-                          case_choices()},
-                         {"samples", "50000", "on each surface, for the distances", {}, 100, 1e8},
-                         {"pixels", "400", "width of a picture; 0 draws none", {}, 0, 4000}},
-          .tables = {{"statue",
-                      "level sets of the statue",
-                      "voxelizer, voxels",
-                      {{"origin", "origin", "the model and where it comes from"},
-                       {"source_triangles", "of", "triangles of the model"},
-                       {"dimensions", "voxels", "dimensions of the active voxels' box"},
-                       {"active", "active voxels", "of the level set, half width 1.5"},
-                       {"seconds", "time [s]", "to voxelize, one run"},
-                       {"printed_seconds", "printed [s]", "figure's time: 16 cores of 2011, another model"},
-                       {"triangles", "triangles", "of the zero set by marching cubes"},
-                       {"lost_rms", "from rms [vx]",
-                        "root mean square distance from the model to the zero set, voxels"},
-                       {"lost_rms_share", "of the size", "the same over the model's longest side"},
-                       {"open", "open", "boundary edges of the zero set"},
-                       {"components", "components", "of the zero set"}}}},
-          .measure = measure_figure_9_4};
+std::vector<MeasuredRow> measure_figure_9_4(const MeasurementInput& input) {
+  return Figure94Measurer(input).run();
 }
 
 }  // namespace hermesh

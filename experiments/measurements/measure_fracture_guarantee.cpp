@@ -1,44 +1,36 @@
-// What a fracture promises, judged on the files that it writes: models, clean and dirty, and random solids.
-#include <algorithm>
+// The guarantees of a fracture, verified on the files that it writes: models, clean and dirty, and random
+// solids.
 #include <cmath>
-#include <filesystem>
-#include <sstream>
 
 #include "experiments/fracture/fracture_folder.h"
 #include "experiments/fracture/fracture_subjects.h"
 #include "experiments/fracture/fracture_trials.h"
-#include "experiments/harness/cell.h"
-#include "experiments/harness/run_cells.h"
 #include "experiments/measurements/measurements.h"
 
 namespace hermesh {
 namespace {
 
-std::vector<std::string> fractured_models() {
-  const std::vector<std::string> excluded = {
-      "thai-statue",     // its file is not in every data folder, and the stand-in has nine million triangles
-      "all-degenerate",  // seven triangles without area enclose nothing: there is nothing to break
-  };
-  std::vector<std::string> names;
-  for (const CaseInfo& info : list_cases())
-    if (info.kind == "file" && std::ranges::count(excluded, info.name) == 0) names.push_back(info.name);
-  return names;
-}
-
 std::vector<std::string> fractured_cases(const std::string& choice) {
   if (choice == "none") return {};
   if (choice == "few") return {"torus", "cad-part"};
-  if (choice == "all") return fractured_models();
-  return {choice};
+  if (choice != "all") return {choice};
+  const std::set<std::string> excluded = {
+      "thai-statue",     // its file is not in every data folder, and the stand-in has nine million triangles
+      "all-degenerate",  // seven triangles without area enclose nothing that could be broken
+  };
+  std::vector<std::string> names;
+  for (const CaseInfo& info : list_cases())
+    if (info.kind == "file" && !excluded.contains(info.name)) names.push_back(info.name);
+  return names;
 }
 
-/// What some fractures of one object have in common.
+/// Sums over fractures.
 struct VolumeSum {
   std::int64_t fractures = 0, pieces = 0, triangles = 0, seams = 0, broken_pieces = 0, crossing = 0,
                unmatched = 0, unbalanced = 0, thinned = 0, changed = 0, forced = 0;
   double volume = 0.0, uncut = 0.0, seconds = 0.0;
 
-  void add(const validation::FractureLedger& ledger, const FractureSummary& summary, double uncut_volume) {
+  void add(const validation::FractureReport& ledger, const FractureSummary& summary, double uncut_volume) {
     ++fractures;
     pieces += ledger.pieces;
     triangles += ledger.triangles;
@@ -74,7 +66,7 @@ class FractureGuarantee {
  public:
   explicit FractureGuarantee(const MeasurementInput& input) : input_(input) {}
 
-  /// Coarse ones first: what is cut short has seen all models.
+  /// Begins with the coarse ones, so that an interrupted run has seen all models.
   std::vector<MeasuredRow> run() {
     for (const double resolution : numbers_in(input_.parameters.text("resolutions")))
       for (const std::string& name : fractured_cases(input_.parameters.text("cases")))
@@ -97,7 +89,7 @@ class FractureGuarantee {
     return result;
   }
 
-  /// An object and its mesh before it is broken; some have no sample inside, and nothing to break.
+  /// An object and its mesh before it is broken. Some have no sample inside and thus nothing to break.
   struct Subject {
     FractureObject object;
     PolygonMesh uncut = {};
@@ -150,7 +142,7 @@ class FractureGuarantee {
     input_.emit({row});
   }
 
-  /// One fracture, by the program's default options. What is wrong with it joins the row's.
+  /// Runs one fracture with the default options and adds its violations to the row.
   void judge(const Subject& subject, const std::string& cutters, std::uint64_t seed, VolumeSum& sum,
              MeasuredRow& row) {
     if (subject.object.hermite.leaves.empty()) return;
@@ -164,7 +156,7 @@ class FractureGuarantee {
       const FractureSummary summary = run_fracture(
           subject.object, made, method, [&](PieceOutput&& piece) { folder.add(std::move(piece), child); },
           child);
-      const validation::FractureLedger ledger =
+      const validation::FractureReport ledger =
           folder.judge(child, subject.uncut, reach_of_pieces(subject.object, method, summary));
       sum.add(ledger, summary, mass_properties(subject.uncut).volume);
       if (ledger.is_consistent()) return;
@@ -178,53 +170,10 @@ class FractureGuarantee {
   VolumeSum models_, trials_;
 };
 
-std::vector<MeasuredColumn> fracture_guarantee_columns() {
-  return {
-      {"resolution", "voxels", "along the longest side"},
-      {"cutters", "cutters", "and how many"},
-      {"fractures", "fractures", "with different seeds"},
-      {"pieces", "pieces", "of all fractures"},
-      {"triangles", "triangles", "of all pieces"},
-      {"seams", "seams", "triangles that stand reversed in exactly one other piece"},
-      {"broken", "broken", "pieces not closed, manifold, oriented and free of self-intersection"},
-      {"crossing", "crossing", "intersecting pairs of triangles of all pieces, each seam once"},
-      {"unmatched", "unmatched", "triangles whose tags are wrong, or that are repeated"},
-      {"unbalanced", "unbalanced", "fractures whose books do not balance"},
-      {"thinned", "thinned", "fractures whose pieces hold 2 % less than the uncut mesh, or 2 % more"},
-      {"volume", "Δ volume",
-       "greatest difference of the sum of the pieces' volumes to that within the original surface, relative"},
-      {"uncut", "Δ uncut [%]",
-       "greatest difference of that sum to the volume of the uncut mesh: what is thinner than a voxel and "
-       "aslant "
-       "is lost beside cuts"},
-      {"changed", "changed", "samples that changed their piece so that all are manifold"},
-      {"forced", "forced", "changes that were no improvement by themselves"},
-      {"seconds", "time [s]", "of the fractures alone"}};
-}
-
 }  // namespace
 
-Measurement fracture_guarantee_measurement() {
-  std::vector<std::string> cases = case_choices();
-  cases.insert(cases.begin(), {"none", "few", "all"});
-  return {.name = "fracture_guarantee",
-          .summary = "what a fracture promises, on models and on random solids",
-          .parameters = {{"cases", "few", "none, two small ones, all models, or one case", cases},
-                         {"resolutions",
-                          "40",
-                          "voxels along the longest side",
-                          {"40", "60", "100", "200", "60 100", "60 100 200"}},
-                         {"cutters",
-                          "voronoi chunks",
-                          "cells with plane or rough walls",
-                          {"voronoi", "chunks", "voronoi chunks"}},
-                         {"pieces", "5 20", "numbers of cells", {"5", "20", "100", "5 20", "5 20 100"}},
-                         {"seeds", "1", "fractures of each kind", {}, 1, 1000},
-                         {"trials", "16", "random solids", {}, 0, 100000}},
-          .tables = {{"models", "models", "object, cutters", fracture_guarantee_columns(), true, true},
-                     {"trials", "random solids", "solid", fracture_guarantee_columns(), false, true},
-                     {"summary", "all fractures of the run", "what", fracture_guarantee_columns()}},
-          .measure = [](const MeasurementInput& input) { return FractureGuarantee(input).run(); }};
+std::vector<MeasuredRow> measure_fracture_guarantee(const MeasurementInput& input) {
+  return FractureGuarantee(input).run();
 }
 
 }  // namespace hermesh

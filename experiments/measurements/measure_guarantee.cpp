@@ -1,31 +1,18 @@
-// What manifold dual contouring promises, judged on the files that it writes: models, clean and dirty, noise,
-// and patterns of signs.
+// The guarantees of the certified extractors, verified on the files of their meshes: models, clean and dirty,
+// noise, and patterns of signs.
 #include <tbb/task_arena.h>
 #include <tbb/task_group.h>
 
-#include <algorithm>
 #include <atomic>
-#include <cmath>
 #include <deque>
 #include <exception>
-#include <functional>
-#include <map>
 #include <mutex>
-#include <optional>
 #include <random>
-#include <sstream>
 #include <tuple>
 #include <utility>
 
-#include "experiments/cases/sha256.h"
 #include "experiments/cases/test_volumes.h"
-#include "experiments/harness/cell.h"
-#include "experiments/harness/run_cells.h"
-#include "experiments/harness/solid_columns.h"
-#include "experiments/measure.h"
-#include "experiments/measurements/guarantee_columns.h"
 #include "experiments/measurements/measurements.h"
-#include "experiments/pipeline.h"
 #include "validation/solid_comparison.h"
 
 namespace hermesh {
@@ -44,7 +31,7 @@ constexpr double kRounding = 1e-4;
 
 /// Certifying the distance takes minutes beyond.
 constexpr int kFinestCertified = 200;
-/// Volumes of noise and patterns up to so many samples along a side.
+/// Largest number of samples along a side of the volumes of noise and patterns that are certified.
 constexpr int kLargestCertified = 32;
 
 struct GuaranteedMethod {
@@ -60,25 +47,22 @@ const std::vector<GuaranteedMethod>& others() {
   return table;
 }
 
-/// Open and self-intersecting models take part, because the promise is made for every input: whatever the
-/// polygons, there is a level set, and its surface is closed.
+/// Includes open and self-intersecting models, because the guarantee covers every input: any polygons have a
+/// level set, and its surface is closed.
 std::vector<std::string> models() {
   const std::vector<std::string> excluded = {
       "thai-statue",  // its file is not in every data folder, and the stand-in has nine million triangles
       "noise-sphere-10m",  // the surface of noise-sphere-1m, and at these resolutions the same level set
-      "all-degenerate",    // seven triangles without area enclose nothing: there is no mesh to judge
+      "all-degenerate",    // seven triangles without area enclose nothing: there is no mesh to validate
   };
   std::vector<std::string> names = case_choices();
   std::erase_if(names, [&](const std::string& name) { return std::ranges::count(excluded, name) > 0; });
   return names;
 }
 
-/// The cases that are made at 400 voxels, too: three scans, one of them open and in pieces, and three parts.
-bool is_made_finer(const std::string& name) {
-  static const std::vector<std::string> names = {"bunny-closed", "nefertiti",  "dragon",
-                                                 "fandisk",      "rocker-arm", "casting"};
-  return std::ranges::count(names, name) > 0;
-}
+/// Cases that are also meshed at 400 voxels: three scans, one of them open and in pieces, and three parts.
+const std::set<std::string> kFiner = {"bunny-closed", "nefertiti",  "dragon",
+                                      "fandisk",      "rocker-arm", "casting"};
 
 std::vector<std::string> chosen_cases(const std::string& choice) {
   if (choice == "few") return {"turned-cube", "torus", "cad-part"};
@@ -86,26 +70,15 @@ std::vector<std::string> chosen_cases(const std::string& choice) {
   return {choice};
 }
 
-/// Digits of a SHA-256 that are kept: of all meshes of all runs no two agree in them by chance.
+/// Digits of a SHA-256, enough that no two meshes of all runs agree in them by chance.
 constexpr std::size_t kDigestDigits = 16;
 
-void set_defects(Json& values, const validation::MeshReport& report) {
-  values["boundary"] = report.boundary_edges;
-  values["non_manifold_edges"] = report.non_manifold_edges;
-  values["non_manifold_vertices"] = report.non_manifold_vertices;
-  values["inconsistent"] = report.inconsistent_edges;
-  values["degenerate"] = report.degenerate_polygons;
-  values["self_intersections"] = report.self_intersections ? report.self_intersections->pairs : 0;
-  values["components"] = report.components;
-  values["euler"] = report.euler_characteristic;
-}
-
-/// States no number for meshes that nobody judged, unless some could not be made.
+/// Sets no number for meshes that were not validated, unless some could not be made.
 void set_violations(Json& values, std::int64_t violations, bool judged) {
   if (judged || violations > 0) values["violations"] = violations;
 }
 
-/// A level set and what its meshes are called.
+/// A level set and the label of its meshes.
 struct Subject {
   std::string kind, label;
   LevelSet level_set;
@@ -115,32 +88,40 @@ struct Subject {
   bool certify = false;
 };
 
-/// What becomes of one extractor at one tolerance over all subjects of a kind.
+/// Sums of one extractor at one tolerance over all subjects of a kind.
 struct GuaranteeSum {
   std::int64_t meshes = 0, triangles = 0, self_intersections = 0, violations = 0, beyond = 0;
   double seconds = 0.0, largest_share = 0.0;
 
-  void add(const GuaranteeSum& other) {
-    meshes += other.meshes;
-    triangles += other.triangles;
-    self_intersections += other.self_intersections;
-    violations += other.violations;
-    beyond += other.beyond;
-    seconds += other.seconds;
-    largest_share = std::max(largest_share, other.largest_share);
+  /// `tolerance`: none for extractors without one.
+  void add(const Json& mesh, std::optional<double> tolerance, bool violates) {
+    ++meshes;
+    violations += violates;
+    triangles += mesh.value("triangles", std::int64_t(0));
+    self_intersections += mesh.value("self_intersections", std::int64_t(0));
+    seconds += mesh.value("seconds", 0.0);
+    if (tolerance.value_or(0.0) <= 0) return;
+    const double upper = std::max(mesh.value("from_upper", 0.0), mesh.value("to_upper", 0.0));
+    largest_share = std::max(largest_share, upper / *tolerance);
+    beyond += mesh.value("lower", 0.0) > *tolerance + kRounding;
   }
 };
 
-/// Sums by kind of subject, extractor and tolerance (−1 for extractors that have none).
-using GuaranteeSums = std::map<std::tuple<std::string, std::string, double>, GuaranteeSum>;
+/// A mesh that was made; the tolerance is none for extractors without one.
+struct MadeMesh {
+  std::string kind;
+  Json values;
+  std::optional<double> tolerance;
+  bool violates;
+};
 
-/// What becomes of one subject at all tolerances, and of the others.
+/// Results of one subject at all tolerances, and of the other extractors.
 struct Overview {
   const Subject& subject;
   std::int64_t meshes = 0;
   Json values = Json::object();
   double seconds = 0.0, held = 0.0;
-  std::optional<double> excess = {};  ///< none where no distance was bounded
+  std::optional<double> excess = {};  ///< none if no distance was bounded
   std::vector<std::string> broken = {};
   std::string digests = {};
 
@@ -157,8 +138,8 @@ struct Overview {
     for (const std::string& violation : violations)
       broken.push_back("tolerance " + readable(tolerance) + ": " + violation);
   }
-  /// Adds what counts of another extractor: edges and vertices that are not manifold, or open, and pairs of
-  /// triangles that intersect.
+  /// Adds another extractor's numbers of open or non-manifold edges and vertices, and of self-intersecting
+  /// pairs.
   void add_other(const std::string& name, const Json& mesh) {
     const auto count = [&](const char* defect) { return mesh.value(defect, std::int64_t(0)); };
     const std::int64_t topology = count("boundary") + count("non_manifold_edges") +
@@ -181,7 +162,7 @@ struct Overview {
 bool is_octree(const MeasurementInput& input) { return input.parameters.is("extractor", kOctree); }
 const char* judged_name(const MeasurementInput& input) { return is_octree(input) ? kOctree : kGuaranteed; }
 
-/// What the labels of rows end with, so that rows of other parameters can stand side by side.
+/// Returns the end of the labels of rows, which distinguishes rows of different parameters.
 std::string label_end(const MeasurementInput& input) {
   std::string end;
   if (is_octree(input)) end += ", octree";
@@ -196,11 +177,11 @@ class SubjectMeasurement {
  public:
   explicit SubjectMeasurement(const MeasurementInput& input)
       : input_(input),
-        tolerances_(numbers_in(input.parameters.text("tolerances"))),
+        tolerances_(words_in("0 " + input.parameters.text("tolerances"))),
         judged_(input.parameters.is("judge", "yes")) {}
 
   std::vector<MeasuredRow> rows;
-  GuaranteeSums sums;
+  std::vector<MadeMesh> meshes;
 
   void measure_model(const std::string& name, double resolution) {
     RunContext child = child_context(input_.context, false);
@@ -217,10 +198,10 @@ class SubjectMeasurement {
                    input_.parameters.is("certify", "yes") && resolution <= kFinestCertified});
   }
 
-  /// Even fields are uniform in [−1, 1], odd ones whole numbers, a third of them on the surface; outside all
-  /// around.
+  /// Even fields are uniform in [−1, 1], odd ones whole numbers, a third of them on the surface; the
+  /// background is outside.
   void measure_noise(int number, int n, const std::string& label) {
-    // Of each field its own, so that a field that breaks a promise can be made again alone.
+    // One generator per field, so that a field that violates a guarantee can be reproduced on its own.
     std::mt19937_64 random(input_.seed + std::uint64_t(number));
     std::uniform_real_distribution<float> value(-1.0f, 1.0f);
     std::uniform_int_distribution<int> whole(-1, 1);
@@ -255,10 +236,10 @@ class SubjectMeasurement {
       source_.emplace(to_mesh_file(*subject.source), child);
     }
     Overview overview{subject};
-    for (std::size_t i = 0; i <= tolerances_.size(); ++i) {
-      const double tolerance = i == 0 ? 0.0 : tolerances_[i - 1];
+    for (const std::string& word : tolerances_) {
+      const double tolerance = std::stod(word);
       GuaranteedMethod ours = {judged_name(input_),
-                               {{"tolerance", readable_exactly(tolerance)},
+                               {{"tolerance", word},
                                 {"placement", input_.parameters.text("placement")},
                                 {"representation", input_.parameters.text("representation")}}};
       if (is_octree(input_)) ours.options["largest_cube"] = input_.parameters.text("largest_cube");
@@ -274,12 +255,6 @@ class SubjectMeasurement {
     reference_report_.reset();
   }
 
-  static std::string readable_exactly(double number) {
-    std::ostringstream text;
-    text << number;
-    return text.str();
-  }
-
   const MeasuredRow& add_row(const Subject& subject, const GuaranteedMethod& contender,
                              std::optional<double> tolerance) {
     MeasuredRow row{"meshes", subject.label, {{"resolution", subject.resolution}}};
@@ -288,14 +263,14 @@ class SubjectMeasurement {
     std::vector<std::string> violations;
     if (const auto failure = attempt([&] { violations = fill(row.values, subject, contender, tolerance); }))
       violations = {*failure};
-    add_to_sum(subject.kind, row, tolerance, !violations.empty());
-    // The others promise less; their defects are figures.
+    meshes.push_back({subject.kind, row.values, tolerance, !violations.empty()});
+    // Defects of the others are values, since they guarantee less.
     if (tolerance) row.broken = std::move(violations);
     rows.push_back(std::move(row));
     return rows.back();
   }
 
-  /// What it breaks of the promises.
+  /// Returns the violated guarantees.
   std::vector<std::string> fill(Json& values, const Subject& subject, const GuaranteedMethod& contender,
                                 std::optional<double> tolerance) {
     RunContext child = child_context(input_.context, false);
@@ -315,10 +290,10 @@ class SubjectMeasurement {
     Job job{.source = {.polygons = subject.source, .volume = &subject.level_set},
             .extract = {.chosen = choose(input_.tables.extractors, contender.name, contender.options)},
             .format = ".ply"};
-    // What the others would break of our promises is counted, though they promise less.
+    // The others are checked against our guarantees, although they guarantee less.
     job.extract.chosen.extractor.promises = find_variant(input_.tables.extractors, kGuaranteed).promises;
     if (!judged_) return job;
-    // The distances over samples, which come along with the certificate, are not wanted.
+    // One sample, since only the certified distances are used.
     job.judge = {.self_intersections = true, .libraries = false, .samples = 1, .solid_samples = 0};
     if (!tolerance) return job;
     job.circumstances.bound = Circumstances::Bound{*tolerance, subject.voxel_size};
@@ -336,7 +311,15 @@ class SubjectMeasurement {
   void describe(Json& values, Outcome& outcome, const Subject& subject, std::optional<double> tolerance,
                 RunContext& context) {
     const validation::MeshReport& report = outcome.judgement.report;
-    set_defects(values, report);
+    values.update(
+        Json{{"boundary", report.boundary_edges},
+             {"non_manifold_edges", report.non_manifold_edges},
+             {"non_manifold_vertices", report.non_manifold_vertices},
+             {"inconsistent", report.inconsistent_edges},
+             {"degenerate", report.degenerate_polygons},
+             {"self_intersections", report.self_intersections ? report.self_intersections->pairs : 0},
+             {"components", report.components},
+             {"euler", report.euler_characteristic}});
     if (source_) compare_with_source(values, outcome.written, subject, tolerance.value_or(0.0), context);
     if (const auto& from = report.certified_from_reference, &to = report.certified_to_reference; from && to) {
       values["from_upper"] = from->upper / subject.voxel_size;
@@ -353,41 +336,31 @@ class SubjectMeasurement {
     }
   }
 
-  /// The promise is about the level set; whether that has the solid of the polygons is a figure.
+  /// The guarantee concerns the level set; its agreement with the solid of the polygons is a value.
   void compare_with_source(Json& values, const MeshFile& written, const Subject& subject, double tolerance,
                            RunContext& context) const {
     const double explained = (1.0 + tolerance) * subject.voxel_size;
-    set_solid(values,
-              source_->compare(written, {.samples = kSolidSamples, .voxel_size = explained}, context));
-  }
-
-  void add_to_sum(const std::string& kind, const MeasuredRow& row, std::optional<double> tolerance,
-                  bool violates) {
-    GuaranteeSum& sum = sums[{kind, row.values["extractor"].get<std::string>(), tolerance.value_or(-1.0)}];
-    ++sum.meshes;
-    sum.violations += violates;
-    sum.triangles += row.values.value("triangles", std::int64_t(0));
-    sum.self_intersections += row.values.value("self_intersections", std::int64_t(0));
-    sum.seconds += row.values.value("seconds", 0.0);
-    const double upper = std::max(row.values.value("from_upper", 0.0), row.values.value("to_upper", 0.0));
-    if (tolerance.value_or(0.0) <= 0) return;
-    sum.largest_share = std::max(sum.largest_share, upper / *tolerance);
-    sum.beyond += row.values.value("lower", 0.0) > *tolerance + kRounding;
+    const validation::SolidComparison solid =
+        source_->compare(written, {.samples = kSolidSamples, .voxel_size = explained}, context);
+    values["solid"] = validation::verdict_word(solid);
+    if (solid.reference_volume.value > 0.0)
+      values["solid_difference"] = 100.0 * solid.difference.value / solid.reference_volume.value;
+    if (solid.mesh_area > 0.0) values["false_area"] = 100.0 * solid.false_area.value / solid.mesh_area;
   }
 
   static inline const std::vector<std::string> kFigures = {"cells", "several_sheets", "held_cells",
                                                            "fanned_edges", "escaped"};
 
   const MeasurementInput& input_;
-  const std::vector<double> tolerances_;
+  const std::vector<std::string> tolerances_;  ///< with 0
   const bool judged_;
   std::optional<validation::SolidReference> source_;  ///< the polygons of a model
   MeshFile reference_;                                ///< the subject's uniform mesh
   std::optional<validation::MeshReport> reference_report_;
 };
 
-/// Subjects side by side, for most of what is done to one is not parallel. Their rows are emitted in the
-/// order of subjects.
+/// Runs subjects concurrently, since most of the work on one is not parallel. Their rows are emitted in the
+/// order of the subjects.
 class Guarantee {
  public:
   explicit Guarantee(const MeasurementInput& input) : input_(input) {}
@@ -404,7 +377,7 @@ class Guarantee {
     const auto work = [&] {
       for (std::size_t i; (i = next++) < work_.size();) {
         input_.context.check();
-        // Isolated, so that a thread that waits for a part of one subject begins no other one meanwhile.
+        // Isolated, so that a thread that waits within one subject does not start another one.
         tbb::this_task_arena::isolate([&] { work_[i].measure(results_[i]); });
         ready[i] = true;
         const std::lock_guard lock(output_);
@@ -415,8 +388,7 @@ class Guarantee {
     tbb::task_group group;
     for (int worker = 0; worker < tbb::this_task_arena::max_concurrency(); ++worker)
       group.run([&] {
-        // An exception that the group saw would end the loops of other subjects halfway, without a word to
-        // them.
+        // An exception that reached the group would end the loops of other subjects halfway.
         try {
           work();
         } catch (...) {
@@ -425,17 +397,12 @@ class Guarantee {
         }
       });
     group.wait();
-    if (failure) {  // what is ready is not lost because something before it is not
+    if (failure) {  // finished rows after a missing one are not lost
       for (; emitted < work_.size(); ++emitted)
         if (ready[emitted]) emit(emitted);
       std::rethrow_exception(failure);
     }
-    std::vector<MeasuredRow> rows;
-    GuaranteeSums sums;
-    for (const SubjectMeasurement& result : results_)
-      for (const auto& [key, sum] : result.sums) sums[key].add(sum);
-    summarise(sums, input_.parameters.is("judge", "yes"), rows);
-    return rows;
+    return summary();
   }
 
  private:
@@ -448,14 +415,14 @@ class Guarantee {
     for (const std::string& name : chosen_cases(input_.parameters.text("cases"))) {
       if (!input_.wants("models", name + label_end(input_))) continue;
       std::vector<double> resolutions = numbers_in(input_.parameters.text("resolutions"));
-      if (is_made_finer(name) && input_.parameters.is("finer", "yes")) resolutions.push_back(400);
+      if (kFiner.contains(name) && input_.parameters.is("finer", "yes")) resolutions.push_back(400);
       for (const double resolution : resolutions)
         work_.push_back({name + " at " + readable(resolution),
                          [=](SubjectMeasurement& subject) { subject.measure_model(name, resolution); }});
     }
   }
 
-  /// Every pair of fields has the next one of the sizes.
+  /// Each pair of fields has the next of the sizes.
   void list_noise() {
     const std::vector<double> sizes = numbers_in(input_.parameters.text("noise_sizes"));
     for (int i = 0; i < int(input_.parameters.number("noise_fields")); ++i) {
@@ -483,7 +450,15 @@ class Guarantee {
 
   void emit(std::size_t i) { input_.emit(std::exchange(results_[i].rows, {})); }
 
-  void summarise(const GuaranteeSums& sums, bool judged, std::vector<MeasuredRow>& rows) {
+  /// Returns sums by kind of subject, extractor and tolerance (−1 for none).
+  std::vector<MeasuredRow> summary() const {
+    const bool judged = input_.parameters.is("judge", "yes");
+    std::map<std::tuple<std::string, std::string, double>, GuaranteeSum> sums;
+    for (const SubjectMeasurement& result : results_)
+      for (const auto& [kind, mesh, tolerance, violates] : result.meshes)
+        sums[{kind, mesh["extractor"].get<std::string>(), tolerance.value_or(-1.0)}].add(mesh, tolerance,
+                                                                                         violates);
+    std::vector<MeasuredRow> rows;
     std::int64_t violations = 0, meshes = 0;
     for (const auto& [key, sum] : sums) {
       const auto& [kind, extractor, tolerance] = key;
@@ -500,6 +475,7 @@ class Guarantee {
     }
     rows.push_back({"summary", std::string("all of ") + judged_name(input_), {{"meshes", meshes}}});
     set_violations(rows.back().values, violations, judged);
+    return rows;
   }
 
   const MeasurementInput& input_;
@@ -511,43 +487,6 @@ class Guarantee {
 
 }  // namespace
 
-Measurement guarantee_measurement() {
-  std::vector<std::string> cases = case_choices();
-  cases.insert(cases.begin(), {"few", "all"});
-  return {
-      .name = "guarantee",
-      .summary = "what the certified extractors promise, on models and on noise",
-      .parameters =
-          {{"cases", "few", "three small ones, all models, or one case", cases},
-           {"resolutions",
-            "50",
-            "voxels along the longest side",
-            {"30", "50", "100", "200", "50 100", "50 100 200"}},
-           {"finer", "no", "whether six named models are made at 400, too", {"yes", "no"}},
-           {"tolerances",
-            "0.1 1",
-            "of the adaptive meshes, in voxels",
-            {"0.1", "1", "0.1 1", "0.05 0.1 0.25 0.5 1 2", "2.5 4 8", "2.5 4 8 14"}},
-           {"extractor", kGuaranteed, "whose promises are judged", {kGuaranteed, kOctree}},
-           {"placement", "unbiased", "option of the extractor", {"unbiased", "optimal", "average"}},
-           {"largest_cube", "8", "option of the extractor", {"8", "4", "2"}},
-           {"representation", "sparse-float", "option of the extractor", {"sparse-float", "sparse"}},
-           {"judge", "yes", "whether meshes are judged, or made for their digests alone", {"yes", "no"}},
-           {"certify", "yes", "whether distances are bounded, up to 200 voxels", {"yes", "no"}},
-           {"others", "yes", "whether other extractors are judged beside it", {"yes", "no"}},
-           {"noise_fields", "4", "random volumes, every second of whole numbers", {}, 0, 1000},
-           {"noise_sizes", "10", "samples along each side of them, in turn", {"8", "10", "32", "32 64"}},
-           {"pattern_fields", "2", "volumes of patterns of signs", {}, 0, 1000},
-           {"patterns_per_axis", "5", "of them along each side of a volume", {}, 1, 40}},
-      .tables = {{"models", "models, at all tolerances", "case", guarantee_overview_columns(), true, true},
-                 {"noise", "fields of noise, at all tolerances", "field", guarantee_overview_columns(), true,
-                  true},
-                 {"patterns", "patterns of signs, at all tolerances", "field", guarantee_overview_columns(),
-                  true, true},
-                 {"meshes", "single meshes, as their files hold them", "subject", guarantee_mesh_columns(),
-                  false, true},
-                 {"summary", "how many break a promise", "what", guarantee_summary_columns()}},
-      .measure = [](const MeasurementInput& input) { return Guarantee(input).run(); }};
-}
+std::vector<MeasuredRow> measure_guarantee(const MeasurementInput& input) { return Guarantee(input).run(); }
 
 }  // namespace hermesh

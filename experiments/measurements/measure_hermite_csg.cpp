@@ -6,11 +6,9 @@
 
 #include "algorithms/extraction/dual_contouring/dual_contouring.h"
 #include "algorithms/hermite/combine.h"
-#include "algorithms/hermite/dense/dense_combine.h"
 #include "algorithms/hermite/samplers.h"
-#include "experiments/harness/run_cells.h"
+#include "algorithms/thesis/voxels/dense_hermite.h"
 #include "experiments/measurements/measurements.h"
-#include "experiments/pipeline.h"
 
 namespace hermesh {
 namespace {
@@ -182,8 +180,7 @@ PolygonMesh beside(const PolygonMesh& mesh, const PolygonMesh& to) {
 }
 
 PackedHermite packed_of(const PolygonMesh& mesh, double voxel_size, const MeasurementInput& input) {
-  const LevelSet level_set = voxelize(
-      mesh, {.chosen = choose(input.tables.voxelizers, "hermesh"), .voxel_size = voxel_size}, input.context);
+  const LevelSet level_set = voxelized(mesh, {.voxel_size = voxel_size}, input);
   return pack(sample_polygons(level_set, 0.0, mesh, input.context), NormalCodeId::octahedral, input.context);
 }
 
@@ -226,7 +223,7 @@ std::vector<MeasuredRow> measure_scans(const MeasurementInput& input) {
                                    row(kLabels[3], combine(Boolean::intersect, a, b, context)),
                                    row(kLabels[4], combine(Boolean::subtract, a, b, context)),
                                    row(kLabels[5], combine(Boolean::subtract, b, a, context))};
-  // Each volume but for what lies between the surfaces in the cells along the seam.
+  // Each volume except for the part between the surfaces in the cells along the seam.
   const auto volume = [&](int i) { return rows[std::size_t(i)].values["volume"].get<double>(); };
   rows[2].values["ledger"] = volume(2) + volume(3) - volume(0) - volume(1);
   rows[4].values["ledger"] = volume(4) + volume(3) - volume(0);
@@ -234,50 +231,12 @@ std::vector<MeasuredRow> measure_scans(const MeasurementInput& input) {
   return rows;
 }
 
+}  // namespace
+
 std::vector<MeasuredRow> measure_hermite_csg(const MeasurementInput& input) {
   std::vector<MeasuredRow> rows = measure_laws(input);
   for (MeasuredRow& row : measure_scans(input)) rows.push_back(std::move(row));
   return rows;
-}
-
-}  // namespace
-
-Measurement hermite_csg_measurement() {
-  return {
-      .name = "hermite-csg",
-      .summary = "Boolean operations on Hermite data: which laws hold, and what two scans give",
-      .parameters = {{"pairs", "100", "random pairs of solids that the laws are tried on", {}, 1, 100000},
-                     {"first", "bunny-closed", "case A", case_choices()},
-                     {"second", "armadillo",
-                      "case B, scaled to A's length and set beside it by a third of that", case_choices()},
-                     {"resolution", "200", "voxels along A's longest side", {}, 8, 20000}},
-      .tables =
-          {{"laws",
-            "crossings in which the two sides of a law differ",
-            "representation",
-            {{"pairs", "pairs", "of random solids"},
-             {"crossings", "crossings", "of all unions together"},
-             {"involution", "¬¬A = A", "crossings that two complements change"},
-             {"de_morgan", "De Morgan", "crossings in which A ∪ B and ¬(¬A ∩ ¬B) differ"},
-             {"commutes", "commutes", "crossings in which A ∪ B and B ∪ A differ"},
-             {"idempotent", "A ∪ A = A", "crossings in which they differ"},
-             {"self_difference", "A \\ A = ∅", "crossings that are left"}}},
-           {"scans",
-            "two scans combined as packed data, then dual contouring",
-            "result",
-            {{"crossings", "crossings", "edges that the surface crosses"},
-             {"triangles", "triangles", "of the mesh"},
-             {"boundary", "open", "boundary edges"},
-             {"non_manifold_edges", "nm e", "non-manifold edges"},
-             {"non_manifold_vertices", "nm v", "non-manifold vertices"},
-             {"inconsistent", "flipped", "inconsistently oriented edges"},
-             {"self_intersections", "crossing", "self-intersecting pairs of triangles"},
-             {"components", "comp.", "connected components"},
-             {"volume", "volume [vx³]", "enclosed volume"},
-             {"ledger", "ledger [vx³]",
-              "by how much the volumes of both parts differ from that of the whole: A ∪ B with A ∩ B from A "
-              "with B, A \\ B with A ∩ B from A, B \\ A with A ∩ B from B"}}}},
-      .measure = measure_hermite_csg};
 }
 
 }  // namespace hermesh

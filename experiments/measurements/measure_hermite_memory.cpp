@@ -1,24 +1,18 @@
-// Bytes of volumes, as they are allocated: tables 2.1 and 2.2 of the thesis, with sparse volumes beside them.
+// Allocated bytes of volumes: tables 2.1 and 2.2 of the thesis, compared with sparse volumes.
 #include <malloc.h>
 
-#include <optional>
-
 #include "algorithms/core/level_set_grid.h"
-#include "algorithms/hermite/dense/dense_hermite.h"
 #include "algorithms/hermite/samplers.h"
 #include "algorithms/lattice/memory_estimate.h"
-#include "experiments/harness/cell.h"
-#include "experiments/harness/run_cells.h"
-#include "experiments/measure.h"
+#include "algorithms/thesis/voxels/dense_hermite.h"
 #include "experiments/measurements/measurements.h"
-#include "experiments/pipeline.h"
 
 namespace hermesh {
 namespace {
 
 constexpr double kMiB = 1024.0 * 1024.0;
 
-/// Resident bytes that `make` adds and keeps, as the kernel counts them, and what it made.
+/// Returns the result of `make`, and sets the resident MiB that it added, as counted by the kernel.
 template <class Make>
 auto resident(Make&& make, Json& mebibytes) {
   malloc_trim(0);
@@ -29,15 +23,13 @@ auto resident(Make&& make, Json& mebibytes) {
   return made;
 }
 
-/// The model, read when the first row asks for it.
+/// The model, read when the first row needs it.
 class Model {
  public:
   explicit Model(const MeasurementInput& input) : input_(input) {}
   LevelSet level_set(double resolution) {
     if (!loaded_) loaded_ = input_.tables.load(input_.parameters.text("case"), input_.context);
-    return voxelize(loaded_->mesh,
-                    {.chosen = choose(input_.tables.voxelizers, "hermesh"), .resolution = resolution},
-                    input_.context);
+    return voxelized(loaded_->mesh, {.resolution = resolution}, input_);
   }
 
  private:
@@ -46,24 +38,21 @@ class Model {
 };
 
 std::vector<MeasuredRow> uniform_rows(Model& model, const MeasurementInput& input) {
-  // What the thesis printed for three floats a voxel.
-  struct Printed {
-    int width;
-    double mebibytes;
-  };
   std::vector<MeasuredRow> rows;
-  for (const Printed& printed : {Printed{64, 3}, {128, 24}, {256, 192}, {512, 1536}, {1024, 12288}}) {
+  // Published MiB of three floats per voxel.
+  for (const auto& [width, mebibytes] :
+       {std::pair(64, 3.0), {128, 24.0}, {256, 192.0}, {512, 1536.0}, {1024, 12288.0}}) {
     input.context.check();
-    MeasuredRow row{"uniform", std::to_string(printed.width) + "³"};
+    MeasuredRow row{"uniform", std::to_string(width) + "³"};
     if (!input.wants(row.table, row.label)) continue;
-    row.values["printed"] = printed.mebibytes;
-    const double bytes = 12.0 * printed.width * printed.width * printed.width;
+    row.values["printed"] = mebibytes;
+    const double bytes = 12.0 * width * width * width;
     const std::optional<std::uint64_t> available = available_memory();
-    if (printed.width <= input.parameters.number("largest_uniform") &&
+    if (width <= input.parameters.number("largest_uniform") &&
         (!available || bytes < 0.8 * double(*available)))
       resident([&] { return std::vector<float>(std::size_t(bytes) / sizeof(float), 1.0f); },
                row.values["uniform"]);
-    const LevelSet level_set = model.level_set(printed.width);
+    const LevelSet level_set = model.level_set(width);
     row.values["level_set"] = double(level_set.memory_bytes()) / kMiB;
     const PackedHermite sparse =
         sample_level_set_packed(level_set, 0.0, NormalCodeId::octahedral, input.context);
@@ -73,13 +62,13 @@ std::vector<MeasuredRow> uniform_rows(Model& model, const MeasurementInput& inpu
   return rows;
 }
 
-/// What one representation takes.
+/// The memory of one representation.
 struct Size {
   std::string label;
-  Json printed;          ///< bytes a voxel in the thesis, where it says
-  double bytes_a_voxel;  ///< of the type; 0 where there is no voxel
-  std::size_t bytes;     ///< allocated, as the data structure counts them
-  Json resident;         ///< MiB, as the kernel does
+  Json printed;          ///< published bytes per voxel, or null
+  double bytes_a_voxel;  ///< of the type; 0 without voxels
+  std::size_t bytes;     ///< allocated, as counted by the data structure
+  Json resident;         ///< MiB, as counted by the kernel
   std::size_t leaves;
 };
 
@@ -149,44 +138,13 @@ std::vector<MeasuredRow> representation_rows(Model& model, const MeasurementInpu
   return rows;
 }
 
+}  // namespace
+
 std::vector<MeasuredRow> measure_hermite_memory(const MeasurementInput& input) {
   Model model(input);
   std::vector<MeasuredRow> rows = uniform_rows(model, input);
   for (MeasuredRow& row : representation_rows(model, input)) rows.push_back(std::move(row));
   return rows;
-}
-
-}  // namespace
-
-Measurement hermite_memory_measurement() {
-  return {
-      .name = "hermite-memory",
-      .summary = "allocated bytes of uniform grids, level sets and Hermite data (tables 2.1 and 2.2)",
-      .parameters =
-          {{"case", "bunny-closed", "model whose level set and Hermite data are set beside them",
-            case_choices()},
-           {"resolution", "800", "voxels along its longest side", {}, 8, 20000},
-           {"largest_uniform", "1024", "width of the largest uniform grid that is allocated", {}, 0, 4096}},
-      .tables = {{"uniform",
-                  "table 2.1: a uniform grid of three floats a voxel, and sparse volumes of the model at the "
-                  "same width",
-                  "voxels",
-                  {{"printed", "printed [MiB]", "what the thesis says"},
-                   {"uniform", "uniform [MiB]", "resident memory that the grid took"},
-                   {"level_set", "level set [MiB]", "allocated by the model's narrow band"},
-                   {"sparse", "sparse [MiB]", "allocated by its packed Hermite data"}}},
-                 {"representations",
-                  "table 2.2: representations of one surface",
-                  "representation",
-                  {{"printed", "printed [B]", "bytes a voxel that the thesis says"},
-                   {"type", "type [B]", "bytes of the voxel's type"},
-                   {"mebibytes", "allocated [MiB]", "by the data structure's own count"},
-                   {"resident", "resident [MiB]", "that making it added, with what it needed on the way"},
-                   {"leaves", "leaves", "blocks of 8³ samples that hold data"},
-                   {"leaf", "B/leaf", "allocated bytes a leaf"},
-                   {"band", "B/band voxel", "allocated bytes an active voxel of the level set"},
-                   {"crossing", "B/crossing", "allocated bytes an edge crossing"}}}},
-      .measure = measure_hermite_memory};
 }
 
 }  // namespace hermesh

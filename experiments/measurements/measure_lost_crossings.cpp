@@ -1,10 +1,11 @@
-// Crossings that a layout of the Hermite voxel cannot tell from none: trap T2 of the notes on the thesis.
+// Crossings that a layout of the Hermite voxel cannot distinguish from none: trap T2 of the notes on the
+// thesis.
 #include <Eigen/Geometry>
 #include <cmath>
 #include <numbers>
 
-#include "algorithms/hermite/dense/dense_hermite.h"
 #include "algorithms/hermite/samplers.h"
+#include "algorithms/thesis/voxels/dense_hermite.h"
 #include "experiments/measurements/measurements.h"
 
 namespace hermesh {
@@ -12,8 +13,8 @@ namespace {
 
 using Eigen::Vector3d;
 
-/// A box about the origin, turned about y, as signed distance: exact beside its faces, right in sign
-/// everywhere.
+/// Returns a box about the origin, turned about y, as signed distance: exact next to its faces, with correct
+/// signs everywhere.
 AnalyticSurface turned_box(const Vector3d& half, double degrees) {
   const Eigen::Matrix3d to_box =
       Eigen::AngleAxisd(-degrees * std::numbers::pi / 180.0, Vector3d::UnitY()).toRotationMatrix();
@@ -34,6 +35,8 @@ std::size_t lost_by(const FloatHermite& hermite, RunContext& context) {
   return lost;
 }
 
+}  // namespace
+
 std::vector<MeasuredRow> measure_lost_crossings(const MeasurementInput& input) {
   const int resolution = int(input.parameters.number("resolution"));
   const double half = 0.5 * resolution;
@@ -50,33 +53,15 @@ std::vector<MeasuredRow> measure_lost_crossings(const MeasurementInput& input) {
     const FloatHermite hermite =
         sample_function(box, lattice, {-reach, -reach, -reach}, {reach, reach, reach}, 1e-9, input.context);
     const std::size_t lost = lost_by<ThesisVoxel>(hermite, input.context);
-    row.values["degrees"] = degrees;
-    row.values["crossings"] = hermite.crossings.size();
-    row.values["thesis"] = lost;
-    row.values["thesis_share"] = double(lost) / double(hermite.crossings.size());
-    row.values["fixed"] = lost_by<FixedVoxel>(hermite, input.context);
+    row.values = {{"degrees", degrees},
+                  {"crossings", hermite.crossings.size()},
+                  {"thesis", lost},
+                  {"thesis_share", double(lost) / double(hermite.crossings.size())},
+                  {"fixed", lost_by<FixedVoxel>(hermite, input.context)}};
     if (row.values["fixed"] != 0) row.broken.push_back("the fixed layout lost crossings");
     rows.push_back(std::move(row));
   }
   return rows;
-}
-
-}  // namespace
-
-Measurement lost_crossings_measurement() {
-  return {.name = "lost-crossings",
-          .summary = "edge crossings that the thesis's layout of the Hermite voxel takes for none",
-          .parameters = {{"resolution", "100", "length of the box in voxels", {}, 4, 2000}},
-          .tables = {{"box",
-                      "a box turned about y: faces next to +z have normals whose code is 0",
-                      "turned by",
-                      {{"degrees", "angle [°]", "by which the box is turned"},
-                       {"crossings", "crossings", "edges that the box's surface crosses"},
-                       {"thesis", "lost, thesis",
-                        "of these, those that the thesis's layout says to have no data"},
-                       {"thesis_share", "share", "their share"},
-                       {"fixed", "lost, fixed", "those that the fixed layout of the same size loses"}}}},
-          .measure = measure_lost_crossings};
 }
 
 }  // namespace hermesh

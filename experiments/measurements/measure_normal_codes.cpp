@@ -1,17 +1,13 @@
-// Error and speed of the 16-bit normals: trap T1 of the notes on the thesis, and what mends it.
+// Error and speed of the 16-bit normals: trap T1 of the notes on the thesis, and its corrections.
 #include <time.h>
 
-#include <algorithm>
 #include <array>
 #include <cmath>
 #include <numbers>
-#include <optional>
-#include <vector>
 
 #include "algorithms/hermite/normal_code.h"
-#include "algorithms/hermite/with_normal_code.h"
+#include "algorithms/hermite/normal_codes.h"
 #include "experiments/cases/random_normals.h"
-#include "experiments/measure.h"
 #include "experiments/measurements/measurements.h"
 
 namespace hermesh {
@@ -23,7 +19,7 @@ using Vector = std::array<double, 3>;
 constexpr std::size_t kCodes = 65'536;
 constexpr double kDegrees = 180.0 / std::numbers::pi;
 
-/// The angle by its chord, since the cosine of a small angle has lost its digits.
+/// Computed from the chord, since the cosine of a small angle has lost its digits.
 double degrees_between(const Normal& p, const Normal& q) {
   const double x = double(p[0]) - q[0], y = double(p[1]) - q[1], z = double(p[2]) - q[2];
   return 2.0 * std::asin(std::min(1.0, 0.5 * std::sqrt(x * x + y * y + z * z))) * kDegrees;
@@ -57,7 +53,7 @@ Sweep sweep_sphere(std::size_t points, const RunContext& context) {
   return sweep;
 }
 
-/// Where the great circle from `start` along the unit tangent has got after an angle in radians.
+/// Returns the point of the great circle from `start` along the unit tangent after an angle in radians.
 Normal walk(const Vector& start, const Vector& tangent, double angle) {
   const double c = std::cos(angle), s = std::sin(angle);
   return {float(c * start[0] + s * tangent[0]), float(c * start[1] + s * tangent[1]),
@@ -71,8 +67,8 @@ std::array<Vector, 2> tangents(const Vector& n) {
   return {{{1.0 + sign * n[0] * n[0] * a, sign * b, -sign * n[0]}, {b, sign + n[1] * n[1] * a, -n[1]}}};
 }
 
-/// The largest error on the border of the cell of normals that share a code, from one of its members. A cell
-/// is seen whole from each of its points, and none is wider than the walk is long.
+/// Returns the largest error on the border of the cell of normals that share a code, searched from one of its
+/// members. A cell is star-shaped about each of its points, and none is wider than kReach.
 template <NormalCode Code>
 double error_on_border(std::uint16_t code, const Normal& member, int directions) {
   constexpr int kHalvings = 20;
@@ -117,22 +113,15 @@ double largest_length_error() {
   return largest;
 }
 
-/// Mean and maximum in degrees as the notes on the thesis state them (trap T1); they know no `nearest`.
-std::optional<std::array<double, 2>> expected(NormalCodeId id) {
-  switch (id) {
-    case NormalCodeId::thesis:
-      return {{1.32, 2.56}};
-    case NormalCodeId::baptista:
-      return {{0.81, 1.92}};
-    case NormalCodeId::rounded:
-      return {{0.34, 0.96}};
-    case NormalCodeId::octahedral:
-      return {{0.34, 0.95}};
-    case NormalCodeId::nearest:
-      break;
-  }
-  return std::nullopt;
-}
+struct ExpectedErrors {
+  NormalCodeId code;
+  double mean, max;  ///< degrees
+};
+/// As stated by the notes on the thesis (trap T1); a code without an entry has no expectation.
+constexpr ExpectedErrors kExpected[] = {{NormalCodeId::thesis, 1.32, 2.56},
+                                        {NormalCodeId::baptista, 0.81, 1.92},
+                                        {NormalCodeId::rounded, 0.34, 0.96},
+                                        {NormalCodeId::octahedral, 0.34, 0.95}};
 
 double percentile(std::vector<float>& errors, double share) {
   const auto at = errors.begin() + std::ptrdiff_t(share * double(errors.size() - 1));
@@ -142,10 +131,7 @@ double percentile(std::vector<float>& errors, double share) {
 
 MeasuredRow error_row(NormalCodeId id, std::vector<float>& errors) {
   double sum = 0.0, squares = 0.0;
-  for (const double error : errors) {
-    sum += error;
-    squares += error * error;
-  }
+  for (const double error : errors) sum += error, squares += error * error;
   const double count = double(errors.size());
   MeasuredRow row{"errors", std::string(name(id)), {}, {}};
   row.values["mean"] = sum / count;
@@ -154,10 +140,11 @@ MeasuredRow error_row(NormalCodeId id, std::vector<float>& errors) {
   row.values["p95"] = percentile(errors, 0.95);
   row.values["p99"] = percentile(errors, 0.99);
   row.values["max"] = *std::max_element(errors.begin(), errors.end());
-  if (const auto figures = expected(id)) {
-    row.values["expected_mean"] = (*figures)[0];
-    row.values["expected_max"] = (*figures)[1];
-    if (std::abs(sum / count - (*figures)[0]) > 0.02 * (*figures)[0])
+  for (const ExpectedErrors& expected : kExpected) {
+    if (expected.code != id) continue;
+    row.values["expected_mean"] = expected.mean;
+    row.values["expected_max"] = expected.max;
+    if (std::abs(sum / count - expected.mean) > 0.02 * expected.mean)
       row.broken.push_back("the mean error is not the expected one");
   }
   return row;
@@ -242,32 +229,27 @@ std::vector<MeasuredRow> measure_speed(const MeasurementInput& input) {
   std::vector<Normal> decoded(normals.size());
   std::vector<std::vector<std::uint16_t>> codes(ids.size(), std::vector<std::uint16_t>(normals.size()));
   std::vector<std::uint16_t> negated(normals.size());
-  std::vector<Contender> contenders;
-  const auto add = [&](std::function<double()> run) {
-    contenders.push_back({.run = std::move(run),
-                          .budget_seconds = 1e9,
-                          .repetitions = int(input.parameters.number("repetitions")),
-                          .seconds = {}});
-  };
+  std::vector<std::function<double()>> work;
   for (std::size_t i = 0; i < ids.size(); ++i) {
     const Loops loops = with_normal_code(ids[i], [](auto code) { return loops_of(code); });
     loops.pack(normals.data(), codes[i].data(), normals.size());
-    add([&, i, loops] { return pass(loops.pack, normals, codes[i]); });
-    add([&, i, loops] { return pass(loops.unpack, codes[i], decoded); });
-    add([&, i, loops] { return pass(loops.negate, codes[i], negated); });
+    work.push_back([&, i, loops] { return pass(loops.pack, normals, codes[i]); });
+    work.push_back([&, i, loops] { return pass(loops.unpack, codes[i], decoded); });
+    work.push_back([&, i, loops] { return pass(loops.negate, codes[i], negated); });
   }
-  race(contenders);
+  const auto nanoseconds = race(work, int(input.parameters.number("repetitions")));
   std::vector<MeasuredRow> rows;
   constexpr std::array kOperations = {"pack", "unpack", "negate"};
-  for (std::size_t i = 0; i < contenders.size(); ++i) {
+  for (std::size_t i = 0; i < nanoseconds.size(); ++i) {
     if (i % 3 == 0) rows.push_back({"speed", std::string(name(ids[i / 3])), {}, {}});
-    const std::vector<double>& nanoseconds = contenders[i].seconds;
     const std::string operation = kOperations[i % 3];
-    rows.back().values[operation] = median(nanoseconds);
-    rows.back().values[operation + "_min"] = *std::min_element(nanoseconds.begin(), nanoseconds.end());
+    rows.back().values[operation] = median(nanoseconds[i]);
+    rows.back().values[operation + "_min"] = std::ranges::min(nanoseconds[i]);
   }
   return rows;
 }
+
+}  // namespace
 
 std::vector<MeasuredRow> measure_normal_codes(const MeasurementInput& input) {
   std::vector<MeasuredRow> rows;
@@ -283,53 +265,6 @@ std::vector<MeasuredRow> measure_normal_codes(const MeasurementInput& input) {
   const Stage stage(input.context, "speed");
   std::ranges::move(measure_speed(input), std::back_inserter(rows));
   return rows;
-}
-
-}  // namespace
-
-Measurement normal_codes_measurement() {
-  return {
-      .name = "normal-codes",
-      .summary = "error, size and speed of normals in 16 bits",
-      .parameters = {{"points", "20000000", "normals that sweep the sphere", {}, 1000, 1e9},
-                     {"directions", "64", "in which the border of every code's cell is sought", {}, 1, 10000},
-                     {"bins", "60", "of the histogram", {}, 1, 1000},
-                     {"last_bin", "3", "where the histogram ends, degrees", {}, 0.01, 180},
-                     {"normals", "1000000", "random normals that are timed", {}, 1000, 1e8},
-                     {"repetitions", "15", "timed passes over them", {}, 1, 1000}},
-      .tables = {{"errors",
-                  "angle between a normal and what comes back from its code",
-                  "code",
-                  {{"codes", "codes", "different codes among those of the sweep"},
-                   {"mean", "mean [°]", "mean error over the sweep of the sphere"},
-                   {"rms", "rms [°]", "root mean square error"},
-                   {"median", "median [°]", "half of the errors are smaller"},
-                   {"p95", "95 % [°]", "95 % of the errors are smaller"},
-                   {"p99", "99 % [°]", "99 % of the errors are smaller"},
-                   {"max", "max [°]", "largest error of the sweep"},
-                   {"cell_max", "cell max [°]",
-                    "largest error on the borders of the cells of all codes, each sought from one normal in "
-                    "the cell"},
-                   {"expected_mean", "expected mean [°]", "the mean that the notes on the thesis give"},
-                   {"expected_max", "expected max [°]", "the maximum that they give"},
-                   {"length_off", "length off",
-                    "largest difference of a length from 1, of all 65,536 codes"}}},
-                 {"speed",
-                  "CPU time a normal on one thread, in chunks that stay in the second-level cache",
-                  "code",
-                  {{"pack", "pack [ns]", "median time to pack a normal"},
-                   {"pack_min", "min [ns]", "shortest"},
-                   {"unpack", "unpack [ns]", "median time to unpack a code"},
-                   {"unpack_min", "min [ns]", "shortest"},
-                   {"negate", "negate [ns]", "median time to negate a code"},
-                   {"negate_min", "min [ns]", "shortest"}}},
-                 {.name = "histogram",
-                  .title = "share of the errors by size",
-                  .first_column = "code",
-                  .columns = {{"error", "error [°]", "middle of the bin"},
-                              {"share", "share", "of the sweep's normals that are in the bin"}},
-                  .printed = false}},
-      .measure = measure_normal_codes};
 }
 
 }  // namespace hermesh

@@ -1,7 +1,6 @@
-// What the thesis's rasterisation by samples misses (§5.2, trap T8), where, and which angle its rule of signs
-// needs (§5.3, trap T12).
+// Voxels that the thesis's rasterisation by samples misses (§5.2, trap T8), and the angle that its rule of
+// signs needs (§5.3, trap T12).
 #include <Eigen/Geometry>
-#include <algorithm>
 #include <array>
 #include <cmath>
 #include <limits>
@@ -10,11 +9,7 @@
 #include "algorithms/core/parallel.h"
 #include "algorithms/search/triangle_tree.h"
 #include "algorithms/thesis/thesis_voxelizer.h"
-#include "experiments/cases/cases.h"
-#include "experiments/harness/cell.h"
-#include "experiments/harness/run_cells.h"
 #include "experiments/measurements/measurements.h"
-#include "experiments/pipeline.h"
 #include "reference/level_set_judge.h"
 #include "validation/features.h"
 
@@ -23,19 +18,19 @@ namespace {
 
 using Eigen::Vector3d;
 
-/// Models with creases and without, all closed, so that rays tell inside from outside.
+/// Models with and without creases, all closed, so that rays distinguish inside from outside.
 constexpr std::array<const char*, 6> kModels = {"bunny-closed", "armadillo", "fandisk",
                                                 "joint",        "cheese",    "turned-cube"};
 constexpr std::array<double, 12> kAngles = {15, 30, 45, 60, 75, 85, 90, 95, 105, 120, 150, 180};
 /// Upper ends of the classes of distances, voxels; the last class has none.
 constexpr std::array<double, 6> kClasses = {0.5, 1, 2, 4, 8, std::numeric_limits<double>::infinity()};
 
-// ---- The oracle: which voxels a triangle meets.
+// ---- The oracle: the voxels that a triangle meets.
 
 enum class Meeting { kNone, kTouching, kCertain };
 
-/// Separating axes of a triangle and an axis-parallel box. Touching is what lies within `slack` voxels of
-/// either answer, far more than rounding errs by, so that the other two are certain.
+/// Tests the separating axes of a triangle and an axis-parallel box. Within kSlack voxels of either answer,
+/// far more than rounding errors, they count as touching, so that the other two results are certain.
 Meeting meet(const GridTriangle& triangle, const Vector3d& centre, const Vector3d& half) {
   constexpr double kSlack = 1e-7, kNoAxis = 1e-9;
   const Vector3d p[3] = {triangle[0] - centre, triangle[1] - centre, triangle[2] - centre};
@@ -61,11 +56,11 @@ Meeting meet(const GridTriangle& triangle, const Vector3d& centre, const Vector3
   return result;
 }
 
-/// Voxels that the triangle meets, found by halving boxes of voxels; those that it may or may not touch
-/// apart.
+/// Voxels that the triangle certainly meets, and those that it may touch.
 struct MetVoxels {
   std::vector<Voxel> certain, touching;
 };
+/// Halves boxes of voxels.
 void find_met(const GridTriangle& triangle, const Voxel& lower, const Voxel& upper, MetVoxels& found) {
   Vector3d centre, half;
   int longest = 0;
@@ -107,10 +102,10 @@ void append_unique(std::vector<Voxel>& all, std::vector<std::vector<Voxel>>& par
 
 /// Boundary voxels of a model by the oracle and by samples.
 struct Boundary {
-  std::vector<Voxel> met, touching, sampled;  ///< of the whole model, in order, each once
-  std::size_t pairs = 0,
-              missed_pairs = 0;  ///< triangles with a voxel that they meet, and those without a sample in it
-  std::size_t invented = 0;      ///< samples in a voxel that their triangle does not meet
+  std::vector<Voxel> met, touching, sampled;  ///< of the whole model, sorted, each once
+  std::size_t pairs = 0;                      ///< of triangles and voxels that they meet
+  std::size_t missed_pairs = 0;               ///< those of them without a sample
+  std::size_t invented = 0;                   ///< samples in a voxel that their triangle does not meet
 };
 Boundary rasterize(const std::vector<Vector3d>& points, const std::vector<Triangle>& triangles,
                    const RunContext& context) {
@@ -146,7 +141,7 @@ Boundary rasterize(const std::vector<Vector3d>& points, const std::vector<Triang
   return boundary;
 }
 
-// ---- Where the misses lie.
+// ---- Positions of the misses.
 
 /// Distances to the creases of a model, voxels.
 class Creases {
@@ -165,7 +160,7 @@ class Creases {
     if (!segments_.empty()) tree_ = std::make_unique<TriangleTree>(ends_, segments_, 1.0);
   }
   std::size_t count() const { return segments_.size(); }
-  /// Infinite where the model has no crease.
+  /// Infinite if the model has no crease.
   double distance(const Voxel& voxel) const {
     if (!tree_) return std::numeric_limits<double>::infinity();
     return std::sqrt(tree_->nearest({double(voxel[0]), double(voxel[1]), double(voxel[2])}).squared);
@@ -290,54 +285,10 @@ class SamplingMeasurer {
   std::vector<MeasuredRow> rows_;
 };
 
-std::vector<MeasuredRow> measure_sampling(const MeasurementInput& input) {
-  return SamplingMeasurer(input).run();
-}
-
 }  // namespace
 
-Measurement sampling_measurement() {
-  return {
-      .name = "sampling",
-      .summary = "boundary voxels that the thesis's samples miss, and its signs by angle",
-      .parameters = {{"resolution", "200", "voxels along a model's longest side", {}, 8, 5000},
-                     {"dihedral", "30", "degrees by which a crease turns at least", {}, 1, 180},
-                     {"samples", "100000", "voxels whose signs are judged, a model", {}, 100, 1e8}},
-      .tables = {{"missed",
-                  "voxels that the surface meets, by separating axes, and that hold no sample",
-                  "model",
-                  {{"origin", "origin", "where the model comes from"},
-                   {"triangles", "triangles", "of the model"},
-                   {"pairs", "pairs", "triangles with each voxel that they meet"},
-                   {"missed_pairs_share", "missed",
-                    "share of these pairs without a sample of the triangle in the voxel"},
-                   {"boundary", "boundary voxels", "that some triangle meets"},
-                   {"missed", "missed", "of these, without a sample of any triangle"},
-                   {"missed_share", "share", "their share"},
-                   {"touching", "touching", "voxels met within rounding of their faces, left out"},
-                   {"invented", "invented", "samples in voxels that their triangle does not meet"},
-                   {"creases", "creases", "edges of the model that turn sharply"},
-                   {"near_share", "near creases", "share of the boundary voxels less than a voxel from one"},
-                   {"missed_near_share", "missed ones near",
-                    "share of the missed voxels less than a voxel from one"}}},
-                 {"where",
-                  "misses by distance to the nearest crease",
-                  "model",
-                  {{"from", "from [vx]", "lower end of the class of distances"},
-                   {"middle", "middle [vx]", "of the class"},
-                   {"voxels", "boundary voxels", "in the class"},
-                   {"missed", "missed", "of these"},
-                   {"missed_share", "share", "their share"}}},
-                 {"sign-angle",
-                  "wrong signs of the thesis's voxelizer by sign angle",
-                  "model",
-                  {{"angle", "angle [°]", "below which a boundary voxel is taken to be outside"},
-                   {"judged", "judged", "voxels within the band that were drawn"},
-                   {"wrong_inside", "inside wrong", "voxels inside that are called outside"},
-                   {"wrong_outside", "outside wrong", "voxels outside that are called inside"},
-                   {"wrong", "wrong", "both"},
-                   {"wrong_share", "share", "of those judged"}}}},
-      .measure = measure_sampling};
+std::vector<MeasuredRow> measure_sampling(const MeasurementInput& input) {
+  return SamplingMeasurer(input).run();
 }
 
 }  // namespace hermesh

@@ -1,6 +1,4 @@
-// Figure 9.11 of the thesis: what adaptive extraction does to the noise of a surface, wavelength by
-// wavelength.
-#include <algorithm>
+// Figure 9.11 of the thesis: the noise of a surface after adaptive extraction, by wavelength.
 #include <array>
 #include <cmath>
 #include <complex>
@@ -8,12 +6,7 @@
 #include <numbers>
 #include <random>
 
-#include "experiments/cases/cases.h"
-#include "experiments/harness/cell.h"
-#include "experiments/harness/run_cells.h"
 #include "experiments/measurements/measurements.h"
-#include "experiments/pictures/render.h"
-#include "experiments/pipeline.h"
 
 namespace hermesh {
 namespace {
@@ -23,8 +16,8 @@ using Eigen::Vector3d;
 /// Lower ends of the bands of wavelengths, voxels; each reaches up to twice its lower end, the last to the
 /// window's width.
 constexpr std::array<int, 5> kBands = {2, 4, 8, 16, 32};
-/// The wavelengths that the noise has, voxels: about as far apart as the particles of a fluid, which are a
-/// few voxels wide.
+/// Wavelengths of the noise, voxels: about the distance of the particles of a fluid, which are a few voxels
+/// wide.
 constexpr double kShortest = 4.0, kLongest = 16.0;
 /// Root mean squares of the noise, voxels.
 constexpr std::array<double, 3> kNoises = {0.03, 0.1, 0.3};
@@ -33,8 +26,8 @@ struct SmoothingWay {
   std::string label, extractor;
   GivenOptions options;
 };
-/// Adaptive dual contouring of the thesis, ours, and OpenVDB's. Hermite data are floats: the thesis's ten
-/// bytes lose crossings where normals point along +z, as they do here, and the noise is what is asked about.
+/// Adaptive dual contouring of the thesis, ours, and OpenVDB's. Hermite data are floats, since the thesis's
+/// ten bytes lose crossings with normals along +z, which are common here.
 std::vector<SmoothingWay> smoothing_ways() {
   std::vector<SmoothingWay> result;
   for (const double threshold : {0.0, 0.05, 0.1, 0.25, 0.5, 2.0, 8.0})
@@ -92,8 +85,8 @@ class Surface {
   std::vector<Wave> swell_, noise_;
 };
 
-/// A block of which the surface is the top, some voxels wider than the window to every side, closed and
-/// oriented. Its points lie half a voxel apart.
+/// Returns a closed, oriented block with the surface as its top, on a grid of side × side points from `start`
+/// on.
 PolygonMesh block_under(const std::vector<double>& heights, int side, double spacing, double start,
                         double depth) {
   PolygonMesh mesh;
@@ -129,7 +122,7 @@ PolygonMesh block_under(const std::vector<double>& heights, int side, double spa
   return mesh;
 }
 
-/// Heights of a mesh's top over the samples (i, j) of the window; NaN where it has none.
+/// Returns the heights of a mesh's top over the samples (i, j) of the window; NaN without one.
 std::vector<double> heights_of(const PolygonMesh& mesh, int width, double floor) {
   std::vector<double> heights(std::size_t(width) * std::size_t(width),
                               std::numeric_limits<double>::quiet_NaN());
@@ -155,8 +148,7 @@ std::vector<double> heights_of(const PolygonMesh& mesh, int width, double floor)
   return heights;
 }
 
-/// In place, along all rows of a square or all columns: Cooley and Tukey's transform of a power of two of
-/// numbers.
+/// Transforms a power of two of numbers in place (Cooley and Tukey).
 void transform(std::vector<std::complex<double>>& values) {
   const std::size_t n = values.size();
   for (std::size_t i = 1, j = 0; i < n; ++i) {
@@ -176,8 +168,8 @@ void transform(std::vector<std::complex<double>>& values) {
       }
 }
 
-/// Root mean square by bands of wavelengths, and of all; the mean is left out. By Parseval's theorem the
-/// bands' squares add up to the whole's, but for wavelengths below the shortest band's.
+/// Root mean square by bands of wavelengths, and of all; without the mean. By Parseval's theorem the squares
+/// of the bands add up to that of all, except for wavelengths below the shortest band.
 struct Roughness {
   std::array<double, kBands.size()> bands{};
   double all = 0.0;
@@ -254,8 +246,7 @@ class SurfaceNoiseMeasurer {
     truth_ = {};
     add_row(kInput, noise, block, {});
     if (all.empty()) return;
-    const LevelSet level_set = voxelize(
-        block, {.chosen = choose(input_.tables.voxelizers, "hermesh"), .voxel_size = 1.0}, input_.context);
+    const LevelSet level_set = voxelized(block, {.voxel_size = 1.0}, input_);
     for (const SmoothingWay& way : all) {
       input_.context.progress(way.label, 0.0);
       RunContext child = child_context(input_.context, false);
@@ -273,7 +264,7 @@ class SurfaceNoiseMeasurer {
       for (int j = 0; j < width_; ++j) {
         const std::size_t at = std::size_t(i) * std::size_t(width_) + std::size_t(j);
         if (std::isnan(residual[at])) {
-          // A fold may hide a sample; the smooth surface stands in, and the row says how often.
+          // A fold may hide a sample; the smooth surface stands in, and the row states the number.
           ++holes;
           residual[at] = surface_.smooth(i, j);
         }
@@ -285,7 +276,7 @@ class SurfaceNoiseMeasurer {
     row.values = {{"noise", noise}, {"points", mesh.points.size()}, {"rms", rough.all}, {"holes", holes}};
     for (std::size_t band = 0; band < kBands.size(); ++band)
       row.values["rms_from_" + std::to_string(kBands[band])] = rough.bands[band];
-    // The first row is the noise as it is, whether or not it is shown.
+    // The first row is the noise of the input, shown or not.
     if (way == kInput) truth_ = rough;
     const double noisy = std::hypot(truth_.bands[1], truth_.bands[2]);
     if (noisy > 0.0) row.values["noise_kept"] = std::hypot(rough.bands[1], rough.bands[2]) / noisy;
@@ -320,11 +311,10 @@ class SurfaceNoiseMeasurer {
     sheet.subtitle =
         "a swell with noise, its rms in voxels first, wavelengths of 4 to 16 voxels; the window is " +
         std::to_string(width_) + " voxels wide; thresholds E in square voxels";
-    sheet.frame = box_;
     sheet.viewpoint = {35.0, 62.0};
-    sheet.close_up = {{0.5, 0.5, 0.97}, 0.22};
+    sheet.close_up = {{0.5, 0.8, 0.5}, 0.22};
     sheet.cell_pixels = int(input_.parameters.number("pixels"));
-    // In pictures y points up, and here it is z that does.
+    // In pictures y points up, here z.
     for (Picture& picture : pictures_)
       picture.load = [load = picture.load] {
         PolygonMesh mesh = load();
@@ -332,11 +322,8 @@ class SurfaceNoiseMeasurer {
         mesh.origin = Vector3d(mesh.origin.y(), mesh.origin.z(), mesh.origin.x());
         return mesh;
       };
-    const Bounds box = sheet.frame;
-    sheet.frame = {};
-    sheet.frame.add({box.lower.y(), box.lower.z(), box.lower.x()});
-    sheet.frame.add({box.upper.y(), box.upper.z(), box.upper.x()});
-    sheet.close_up.centre = {0.5, 0.8, 0.5};
+    sheet.frame.add({box_.lower.y(), box_.lower.z(), box_.lower.x()});
+    sheet.frame.add({box_.upper.y(), box_.upper.z(), box_.upper.x()});
     sheet.pictures = std::move(pictures_);
     render_sheet(input_.out / ("figure-9-11-" + std::to_string(width_) + ".png"), std::move(sheet),
                  input_.context);
@@ -352,43 +339,10 @@ class SurfaceNoiseMeasurer {
   std::vector<MeasuredRow> rows_;
 };
 
-std::vector<MeasuredRow> measure_surface_noise(const MeasurementInput& input) {
-  return SurfaceNoiseMeasurer(input).run();
-}
-
 }  // namespace
 
-Measurement surface_noise_measurement() {
-  std::vector<MeasuredColumn> columns = {
-      {"noise", "noise [vx]", "root mean square of the noise"},
-      {"threshold", "E [vx²]", "of adaptive-dual-contouring"},
-      {"points", "points", "of the mesh"},
-      {"rms", "rms [vx]", "root mean square of the heights less those of the smooth surface"}};
-  for (std::size_t band = 0; band < kBands.size(); ++band) {
-    const bool last = band + 1 == kBands.size();
-    const std::string from = std::to_string(kBands[band]);
-    columns.push_back({"rms_from_" + from, "from " + from,
-                       "the part of it with wavelengths of " + from + " voxels" +
-                           (last ? " and more" : " to " + std::to_string(2 * kBands[band]))});
-  }
-  columns.push_back({"noise_kept", "noise kept",
-                     "rms of wavelengths of 4 to 16 voxels, which the noise has, over that of the polygons"});
-  columns.push_back(
-      {"from_noisy", "from noisy [vx]", "root mean square of the heights less those of the noisy surface"});
-  columns.push_back({"holes", "holes", "samples of the window without a height"});
-  return {.name = "surface-noise",
-          .summary = "roughness of adaptive meshes of a noisy surface by wavelength (figure 9.11)",
-          .parameters = {{"width", "256", "of the window, voxels", {"64", "128", "256", "512"}},
-                         {"swell", "4", "amplitude of the smooth surface, voxels", {}, 0, 100},
-                         {"pixels", "330", "width of a picture; 0 draws none", {}, 0, 4000}},
-          .tables = {{"roughness", "roughness of the top of a block by wavelength", "mesh", columns},
-                     {.name = "kept",
-                      .title = "noise kept by threshold",
-                      .first_column = "noise",
-                      .columns = {{"threshold", "E [vx²]", "threshold"},
-                                  {"noise_kept", "noise kept", "as above"}},
-                      .printed = false}},
-          .measure = measure_surface_noise};
+std::vector<MeasuredRow> measure_surface_noise(const MeasurementInput& input) {
+  return SurfaceNoiseMeasurer(input).run();
 }
 
 }  // namespace hermesh

@@ -1,35 +1,25 @@
-// Tables 9.3 and 9.4 of the thesis, and their figures: a large level set contoured finely only where a camera
-// looks. And what becomes of the points when the resolution doubles, as it does from the one table to the
-// other.
+// Tables 9.3 and 9.4 of the thesis, and their figures: a large level set contoured finely only in the view of
+// a camera. Also the growth of the vertices when the resolution doubles, as it does between the two tables.
 #include <openvdb/tools/Composite.h>
 
-#include <algorithm>
 #include <array>
 #include <cmath>
 #include <iomanip>
 #include <limits>
-#include <map>
-#include <optional>
 #include <sstream>
 
 #include "algorithms/core/level_set_grid.h"
 #include "algorithms/extraction/adaptivity_field.h"
 #include "algorithms/extraction/frustum.h"
-#include "experiments/cases/recipes.h"
-#include "experiments/harness/cell.h"
-#include "experiments/harness/level_set_facts.h"
-#include "experiments/harness/run_cells.h"
-#include "experiments/measure.h"
+#include "experiments/harness/facts.h"
 #include "experiments/measurements/measurements.h"
-#include "experiments/pictures/render.h"
-#include "experiments/pipeline.h"
 
 namespace hermesh {
 namespace {
 
 using Outside = AdaptivityField::Outside;
 
-/// What the thesis printed; nothing without a mask in table 9.4.
+/// Published values; there are none without a mask in table 9.4.
 struct PrintedMesh {
   std::optional<double> points, seconds;
 };
@@ -42,18 +32,18 @@ const Treatment kTreatments[] = {
     {"none", Outside::everywhere, {2'366'433, 10.86}, {}},
     {"max simplification outside", Outside::simplify, {1'227'972, 7.05}, {6'845'410, 37.99}},
     {"no mesh outside", Outside::nothing, {1'052'087, 5.64}, {6'196'708, 29.6}}};
-/// What OpenVDB's mesher stands in for: the thesis's old method without a mask, in the caption of table 9.3.
+/// The thesis's old method without a mask (caption of table 9.3), for which OpenVDB's mesher stands in.
 constexpr PrintedMesh kPrintedOldMethod{6'762'593, 28.72};
-/// What the threshold is divided by where the points of two resolutions are compared.
+/// Divisors of the threshold at the finer of two resolutions.
 constexpr std::array<double, 5> kDivisors = {1, 2, 4, 6, 8};
-/// How many times as many points a surface takes on a lattice twice as fine if its mesh does not depend on
-/// scale: each region then stands for a quarter of the area.
+/// Growth of the vertices on a lattice twice as fine if the mesh does not depend on scale: each region then
+/// covers a quarter of the area.
 constexpr double kScaleFree = 4.0;
 constexpr int kMaskResolution = 84;  ///< longest side of the printed mask, 84 x 72 x 63
 constexpr double kTable93Resolution = 2671.0, kTable94Resolution = 5337.0;
 
-/// A camera within the splash that looks along it. Its frustum has the printed mask's proportions and sees
-/// somewhat less than half of the surface, as the printed points say: 1 052 087 of 2 366 433.
+/// Returns a camera within the splash that looks along it. Its frustum has the proportions of the printed
+/// mask and contains somewhat less than half of the surface, like the printed points: 1 052 087 of 2 366 433.
 Frustum camera(double length) {
   constexpr double kFar = 0.62, kShare = 0.285;
   const Eigen::Vector3d position(0.0, 0.02, 0.45);
@@ -78,10 +68,9 @@ struct Splash {
   double seconds = 0.0;
 };
 
-/// The parts one by one, and their union: within a part next to nothing overlaps, and what lies inside others
-/// need not be looked for among the polygons.
+/// Voxelizes the parts one by one and unites them: parts hardly overlap themselves, and no polygons inside
+/// other parts have to be found.
 Splash make_splash(double length, const MeasurementInput& input) {
-  const VoxelizeRecipe recipe{.chosen = choose(input.tables.voxelizers, "hermesh"), .voxel_size = 1.0};
   Splash splash;
   for (const double part : {1.0, 2.0, 3.0, 4.0}) {
     const PolygonMesh mesh = make_recipe(
@@ -89,7 +78,7 @@ Splash make_splash(double length, const MeasurementInput& input) {
     splash.triangles += mesh.triangle_count();
     splash.box.add(bounds(mesh));
     splash.seconds += timed([&] {
-      const LevelSet made = voxelize(mesh, recipe, input.context);
+      const LevelSet made = voxelized(mesh, {.voxel_size = 1.0}, input);
       splash.level_set = part == 1.0 ? made : united(splash.level_set, made);
     });
   }
@@ -109,14 +98,13 @@ std::string growth_label(const Treatment& treatment, double divisor) {
 std::string law_label(const Treatment& treatment, bool printed) {
   return std::string(treatment.label) + (printed ? ", as printed" : ", scale-free");
 }
-/// How many times the points of table 9.3 those of table 9.4 are.
+/// Returns the points of table 9.4 over those of table 9.3.
 std::optional<double> printed_growth(const Treatment& treatment) {
   if (!treatment.table_9_4.points) return std::nullopt;
   return *treatment.table_9_4.points / *treatment.table_9_3.points;
 }
 
-/// Points of the splash at two resolutions, the second twice the first, with thresholds divided by more and
-/// more.
+/// Counts the vertices of the splash at two resolutions, the second twice the first, for several thresholds.
 class Growth {
  public:
   explicit Growth(const MeasurementInput& input)
@@ -179,9 +167,9 @@ class Growth {
     if (const auto printed = printed_growth(treatment)) add_law(treatment, base, most, found, *printed, true);
   }
 
-  /// The divisor at which the points grow as asked: by the straight line through the two nearest pairs of
-  /// logarithms, whose answer joins them, until it is met within one in two hundred. Points grow with the
-  /// divisor, but for noise.
+  /// Searches the divisor at which the points grow by `growth`, along the straight line through the
+  /// logarithms of the two nearest pairs, until it is met within 0.5 %. Except for noise, points grow with
+  /// the divisor.
   void add_law(const Treatment& treatment, double base, double most, std::map<double, double>& found,
                double growth, bool printed) {
     if (!input_.wants("law", law_label(treatment, printed))) return;
@@ -253,32 +241,30 @@ class Tables93And94Measurer {
   }
 
   void make_level_set() {
-    Splash splash = make_splash(resolution_, input_);
+    const Splash splash = make_splash(resolution_, input_);
     level_set_ = splash.level_set;
     box_ = splash.box;
-    MeasuredRow row{"input", splash_label()};
-    row.values["triangles"] = splash.triangles;
-    row.values["dimensions"] = dimensions_of(level_set_);
-    row.values["active"] = level_set_.active_voxels();
-    row.values["seconds"] = splash.seconds;
-    rows_.push_back(std::move(row));
+    rows_.push_back({"input",
+                     splash_label(),
+                     {{"triangles", splash.triangles},
+                      {"dimensions", dimensions_of(level_set_)},
+                      {"active", level_set_.active_voxels()},
+                      {"seconds", splash.seconds}}});
   }
 
   void make_mask() {
     std::vector<double> seconds;
-    for (int i = 0; i < repetitions(); ++i)
+    for (int i = 0; i < int(input_.parameters.number("repetitions")); ++i)
       seconds.push_back(
           timed([&] { mask_ = frustum_mask(camera(resolution_), kMaskResolution, input_.context); }));
-    MeasuredRow row{"input", kMaskLabel};
-    row.values["dimensions"] = dimensions_of(mask_);
-    row.values["active"] = mask_.active_voxels();
-    row.values["seconds"] = median(seconds);
-    rows_.push_back(std::move(row));
+    rows_.push_back({"input",
+                     kMaskLabel,
+                     {{"dimensions", dimensions_of(mask_)},
+                      {"active", mask_.active_voxels()},
+                      {"seconds", median(seconds)}}});
   }
 
-  int repetitions() const { return static_cast<int>(input_.parameters.number("repetitions")); }
-
-  /// What is wanted, and always the first, which the others are set against.
+  /// Measures the wanted treatments and always the first, with which the others are compared.
   void measure(const std::string& name, const GivenOptions& options) {
     double all = 0.0;
     for (const Treatment& treatment : kTreatments) {
@@ -290,7 +276,7 @@ class Tables93And94Measurer {
     }
   }
 
-  /// The rate of the same level set by OpenVDB's mesher, which has no mask, beside that of the caption.
+  /// Measures OpenVDB's mesher, which has no mask, on the same level set.
   void measure_old() {
     const auto [row, mesh] =
         repeat("old-method", kOldLabel, {.chosen = choose(input_.tables.extractors, "openvdb")});
@@ -321,29 +307,20 @@ class Tables93And94Measurer {
     return row;
   }
 
-  /// Repetitions of an extraction: the row of their median, and the mesh.
+  /// Returns the row of an extraction and its mesh.
   std::pair<MeasuredRow, PolygonMesh> repeat(const std::string& table, const std::string& label,
                                              const ExtractRecipe& recipe) {
-    std::vector<double> seconds;
-    std::optional<std::int64_t> peak;
-    PolygonMesh mesh;
-    for (int i = 0; i < repetitions(); ++i) {
-      input_.context.check();
-      mesh = {};
-      RunContext child = child_context(input_.context, false);
-      const PeakMemory memory;
-      seconds.push_back(timed([&] { mesh = extract(level_set_, nullptr, recipe, child).mesh; }));
-      if (i == 0) peak = memory.bytes();
-    }
-    MeasuredRow row{table, label};
-    row.values["points"] = mesh.points.size();
-    row.values["polygons"] = mesh.triangles.size() + mesh.quads.size();
-    row.values["seconds"] = median(seconds);
-    if (peak) row.values["peak"] = double(*peak) / (1 << 20);
+    auto [mesh, context, seconds, peak] = extract_repeatedly(level_set_, recipe, input_);
+    MeasuredRow row{table,
+                    label,
+                    {{"points", mesh.points.size()},
+                     {"polygons", mesh.triangles.size() + mesh.quads.size()},
+                     {"seconds", seconds}}};
+    if (peak) row.values["peak"] = *peak;
     return {std::move(row), std::move(mesh)};
   }
 
-  /// Figures 9.12 and 9.14 on one sheet, the whole with a close-up of the frustum's border; figure 9.13 on
+  /// Draws figures 9.12 and 9.14 on one sheet, with a close-up of the frustum's border, and figure 9.13 on
   /// another.
   void draw() const {
     Sheet whole;
@@ -382,81 +359,13 @@ class Tables93And94Measurer {
   std::vector<MeasuredRow> rows_;
 };
 
+}  // namespace
+
 std::vector<MeasuredRow> measure_tables_9_3_and_9_4(const MeasurementInput& input) {
   if (input.parameters.is("growth", "only")) return Growth(input).run();
   std::vector<MeasuredRow> rows = Tables93And94Measurer(input).run();
   if (input.parameters.is("growth", "yes")) std::ranges::move(Growth(input).run(), std::back_inserter(rows));
   return rows;
-}
-
-}  // namespace
-
-Measurement tables_9_3_and_9_4_measurement() {
-  const std::vector<MeasuredColumn> columns = {
-      {"points", "points", "points of the mesh"},
-      {"printed_points", "printed", "those of the thesis, of another splash"},
-      {"share", "of none [%]", "points over those without a mask; printed: 51.9 and 44.5 %"},
-      {"polygons", "polygons", "triangles and quads"},
-      {"seconds", "time [s]", "median, Hermite data included"},
-      {"printed_seconds", "printed [s]", "16 cores of 2011, the copy to a host included"},
-      {"peak", "peak [MiB]", "resident memory beyond the level set"}};
-  std::vector<MeasuredColumn> old_columns = columns;
-  std::erase_if(old_columns, [](const MeasuredColumn& column) { return column.name == "share"; });
-  old_columns.push_back(
-      {"points_of_new", "÷ new points", "points over those of the new method without a mask; printed: 2.86"});
-  old_columns.push_back(
-      {"seconds_of_new", "÷ new time", "time over that of the new method without a mask; printed: 2.64"});
-  return {
-      .name = "tables-9-3-and-9-4",
-      .summary = "a frustum as a mask of adaptive extraction, on a procedural splash",
-      .parameters =
-          {{"resolution", "2671", "voxels along the longest side; 5337 for table 9.4", {}, 100, 20000},
-           {"units_per_square_voxel", "1000", "see table_9_2.toml", {}, 1e-6, 1e12},
-           {"repetitions", "3", "timed runs", {}, 1, 100},
-           {"guaranteed", "no", "whether manifold-dual-contouring runs beside it", {"yes", "no"}},
-           {"tolerance", "0.25", "its tolerance, voxels", {}, 1e-3, 100},
-           {"growth",
-            "no",
-            "whether the points are compared with those at half the resolution, or nothing else is done",
-            {"no", "yes", "only"}},
-           {"representation",
-            "sparse-float",
-            "Hermite data of that comparison; 'thesis' has the printed 10 bytes",
-            {"sparse-float", "thesis"}},
-           {"pixels", "600", "width of a picture; 0 draws none", {}, 0, 4000}},
-      .tables = {{"input",
-                  "the level sets",
-                  "what",
-                  {{"triangles", "triangles", "that it was made from"},
-                   {"dimensions", "voxels", "dimensions of the active voxels' box"},
-                   {"active", "active voxels", "of the level set"},
-                   {"seconds", "time [s]", "to make it"}}},
-                 {"adaptive-dual-contouring", "the thesis's method, threshold 250", "mask", columns},
-                 {"manifold-dual-contouring", "ours, with its guarantees", "mask", columns},
-                 {"old-method", "what stands in for the old method, on the same level set", "method",
-                  old_columns},
-                 {"growth",
-                  "points at this resolution over those at half of it, thresholds divided",
-                  "mask, threshold",
-                  {{"divisor", "÷ E", "by which the threshold is divided at the finer resolution"},
-                   {"threshold", "E [vx²]", "threshold at the finer resolution"},
-                   {"coarse_points", "coarse", "points at half the resolution, threshold undivided"},
-                   {"fine_points", "fine", "points at this resolution"},
-                   {"growth", "growth", "one over the other"},
-                   {"printed_growth", "printed",
-                    "that from table 9.3 to table 9.4, where the threshold was not divided"}}},
-                 {"law",
-                  "the divisor at which the points grow as asked",
-                  "mask, target",
-                  {{"target", "target",
-                    "the growth asked for: that of the tables, or 4, as of a mesh without a scale"},
-                   {"divisor", "÷ E", "by which the threshold has to be divided when the resolution doubles"},
-                   {"met", "met", "1 where a threshold was found at which they do"},
-                   {"growth", "growth", "met at that divisor, or the nearest that was found"},
-                   {"most", "at E = 0", "growth where nothing is merged at the finer resolution"},
-                   {"exponent", "exponent",
-                    "power of the voxel's size that the threshold in square voxels goes with"}}}},
-      .measure = measure_tables_9_3_and_9_4};
 }
 
 }  // namespace hermesh

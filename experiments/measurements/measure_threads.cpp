@@ -1,19 +1,11 @@
-// How every part of the pipeline gains from threads: voxelizers, extractors, Booleans, fractures.
+// Speed of voxelizers, extractors, Booleans and fractures by number of threads.
 #include <tbb/global_control.h>
 
-#include <algorithm>
-#include <functional>
-
 #include "algorithms/hermite/combine.h"
-#include "algorithms/hermite/dense/dense_combine.h"
 #include "algorithms/hermite/samplers.h"
-#include "experiments/cases/cases.h"
+#include "algorithms/thesis/voxels/dense_hermite.h"
 #include "experiments/fracture/fracture_run.h"
-#include "experiments/harness/cell.h"
-#include "experiments/harness/run_cells.h"
-#include "experiments/measure.h"
 #include "experiments/measurements/measurements.h"
-#include "experiments/pipeline.h"
 
 namespace hermesh {
 namespace {
@@ -28,49 +20,36 @@ constexpr const char* kBooleans[] = {"union, sparse, packed", "union, thesis's 1
                                      "union, fixed 10-byte voxels"};
 constexpr const char* kThreadMethods[] = {"labelled", "thesis", "openvdb"};
 
-/// 1, 2, 4, … and all that there are.
-std::vector<std::size_t> thread_counts() {
-  std::vector<std::size_t> counts;
-  const std::size_t most = tbb::global_control::active_value(kAllowedThreads);
-  for (std::size_t count = 1; count < most; count *= 2) counts.push_back(count);
-  counts.push_back(most);
-  return counts;
-}
-
-/// One piece of work with every number of threads, in turns; it returns its seconds.
+/// Times one piece of work, which returns its seconds, with each number of threads, interleaved.
 std::vector<MeasuredRow> times_by_threads(const std::string& table, const std::string& label,
                                           const std::function<double()>& work,
                                           const MeasurementInput& input) {
   const std::vector<std::size_t> counts = thread_counts();
   std::vector<double> cpu(counts.size(), 0.0);
-  std::vector<Contender> contenders;
-  for (std::size_t i = 0; i < counts.size(); ++i) {
-    const auto limited = [&, i] {
+  std::vector<std::function<double()>> runs;
+  for (std::size_t i = 0; i < counts.size(); ++i)
+    runs.push_back([&, i] {
       input.context.check();
       const tbb::global_control limit(kAllowedThreads, counts[i]);
       const double start = process_cpu_seconds();
       const double seconds = work();
       cpu[i] += process_cpu_seconds() - start;
       return seconds;
-    };
-    contenders.push_back({.run = limited,
-                          .budget_seconds = input.parameters.number("budget"),
-                          .repetitions = int(input.parameters.number("repetitions")),
-                          .seconds = {}});
-  }
-  contenders.back().run();  // warms caches and pools
+    });
+  runs.back()();  // warms caches and pools
   cpu.back() = 0.0;
-  race(contenders);
+  const auto times =
+      race(runs, int(input.parameters.number("repetitions")), input.parameters.number("budget"));
   std::vector<MeasuredRow> rows;
   for (std::size_t i = 0; i < counts.size(); ++i) {
-    const double seconds = median(contenders[i].seconds);
+    const double seconds = median(times[i]), one = median(times[0]);
     MeasuredRow row{table, label};
     row.values = {{"threads", counts[i]},
                   {"seconds", seconds},
-                  {"shortest", std::ranges::min(contenders[i].seconds)},
-                  {"cpu_seconds", cpu[i] / double(contenders[i].seconds.size())},
-                  {"speedup", median(contenders[0].seconds) / seconds},
-                  {"efficiency", median(contenders[0].seconds) / seconds / double(counts[i])}};
+                  {"shortest", std::ranges::min(times[i])},
+                  {"cpu_seconds", cpu[i] / double(times[i].size())},
+                  {"speedup", one / seconds},
+                  {"efficiency", one / seconds / double(counts[i])}};
     rows.push_back(std::move(row));
   }
   return rows;
@@ -103,7 +82,7 @@ class ThreadsMeasurer {
             .resolution = input_.parameters.number("resolution")};
   }
 
-  /// The work gets a context of its own each time, so that no progress is shown within what is timed.
+  /// Each run gets its own context, so that timed work shows no progress.
   void add(const std::string& table, const std::string& label, const std::function<void(RunContext&)>& work) {
     if (!input_.wants(table, label)) return;
     input_.context.progress(table + ", " + label, 0.0);
@@ -141,11 +120,7 @@ class ThreadsMeasurer {
     if (!input_.wants_any("hermite", kBooleans)) return;
     RunContext& context = input_.context;
     const PackedHermite a = sample_level_set_packed(level_set_, 0.0, kCode, context);
-    PackedHermite b = a;
-    std::int32_t low = 0, high = 0;
-    for (const SignLeaf& leaf : b.leaves)
-      low = std::min(low, leaf.lower[0]), high = std::max(high, leaf.lower[0]);
-    for (SignLeaf& leaf : b.leaves) leaf.lower[0] += ((high - low) / 10) & ~7;
+    const PackedHermite b = shifted(a);
     add("hermite", kBooleans[0], [&](RunContext& own) { combine(Boolean::unite, a, b, own); });
     {
       const ThesisDense x = to_dense<ThesisVoxel>(a, context), y = to_dense<ThesisVoxel>(b, context);
@@ -157,10 +132,9 @@ class ThreadsMeasurer {
 
   void race_fractures() {
     RunContext& context = input_.context;
-    const VoxelizeRecipe coarser{.chosen = choose(input_.tables.voxelizers, "hermesh"),
-                                 .resolution = input_.parameters.number("fracture_resolution")};
     FractureObject object;
-    object.level_set = voxelize(model_, coarser, context);
+    object.level_set =
+        voxelized(model_, {.resolution = input_.parameters.number("fracture_resolution")}, input_);
     object.hermite = sample_polygons(object.level_set, 0.0, model_, context);
     CutterChoices choices;
     choices.seed = input_.seed;
@@ -185,35 +159,10 @@ class ThreadsMeasurer {
   std::vector<MeasuredRow> rows_;
 };
 
-std::vector<MeasuredRow> measure_threads(const MeasurementInput& input) {
-  return ThreadsMeasurer(input).run();
-}
-
 }  // namespace
 
-Measurement threads_measurement() {
-  const std::vector<MeasuredColumn> columns = {
-      {"threads", "threads", "how many"},
-      {"seconds", "time [s]", "median"},
-      {"shortest", "min [s]", "shortest"},
-      {"cpu_seconds", "CPU [s]", "of all threads, mean"},
-      {"speedup", "speedup", "times as fast as with one thread, by medians"},
-      {"efficiency", "efficiency", "speedup over threads; 1 is perfect"}};
-  return {
-      .name = "threads",
-      .summary = "speed of every part by number of threads",
-      .parameters = {{"case", "dragon", "model", case_choices()},
-                     {"resolution", "400", "voxels along its longest side", {}, 8, 20000},
-                     {"fracture_resolution", "200", "the same for the object that is broken", {}, 8, 20000},
-                     {"pieces", "20", "Voronoi cells that it is broken into", {}, 2, 1000},
-                     {"repetitions", "5", "of every number of threads, in turns", {}, 1, 1000},
-                     {"budget", "20", "seconds that the repetitions of one number may take", {}, 0, 1e6}},
-      .tables = {{"voxelizers", "polygons to a level set", "voxelizer", columns},
-                 {"extractors", "level set to a mesh, Hermite data included", "extractor", columns},
-                 {"hermite", "Hermite data: made, and united with the same moved by a tenth", "operation",
-                  columns},
-                 {"fracture", "a fracture by plane cuts, meshes included", "method", columns}},
-      .measure = measure_threads};
+std::vector<MeasuredRow> measure_threads(const MeasurementInput& input) {
+  return ThreadsMeasurer(input).run();
 }
 
 }  // namespace hermesh

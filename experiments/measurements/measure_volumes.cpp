@@ -1,20 +1,14 @@
-// Scans, fog and level sets of other programs through the extractors, with both treatments of the end of the
-// data.
+// Extraction of scans, fog and level sets of other programs, with both treatments of the end of the data.
 
 #include <array>
 
 #include "algorithms/core/level_set_grid.h"
-#include "experiments/cases/volume_cases.h"
-#include "experiments/harness/cell.h"
-#include "experiments/harness/run_cells.h"
 #include "experiments/measurements/measurements.h"
-#include "experiments/pictures/render.h"
-#include "experiments/pipeline.h"
 
 namespace hermesh {
 namespace {
 
-/// Three isovalues; of whole-numbered data at least two that many samples have exactly.
+/// Three isovalues; in whole-numbered data many samples equal at least two of them.
 struct Entry {
   const char* table;
   const char* volume;
@@ -31,7 +25,7 @@ constexpr std::array<Entry, 4> kEntries = {{
     {"level-set", "cube-level-set", {-0.1, 0.0, 0.1}, {-2.0, 0.0, 2.0}, {29.0, 20.0}},
 }};
 
-/// Every n-th sample of a dense volume along each axis, for quick runs. Level sets and fog are left alone.
+/// Returns every n-th sample of a dense volume along each axis, for quick runs; level sets and fog unchanged.
 LevelSet thinned(const LevelSet& volume, int every) {
   const openvdb::FloatGrid& grid = *volume.grid().grid;
   if (every == 1 || grid.getGridClass() != openvdb::GRID_UNKNOWN) return volume;
@@ -50,7 +44,6 @@ LevelSet thinned(const LevelSet& volume, int every) {
   return make_level_set(result);
 }
 
-/// Who competes; add a name to have another.
 constexpr std::array<const char*, 4> kExtractors = {"marching-cubes", "dual-contouring",
                                                     "manifold-dual-contouring", "openvdb"};
 
@@ -121,12 +114,12 @@ class VolumesMeasurer {
     const auto& [report, check] = judge(to_mesh_file(ended.mesh), recipe.chosen.extractor.promises,
                                         crossings_ ? kPromisesAlone : kCounts, child,
                                         {.cut_open = recipe.ends == Ends::open && ended.ends.any()});
-    row.values["triangles"] = ended.mesh.triangle_count();
-    row.values["open"] = report.boundary_edges;
-    row.values["nm_edges"] = report.non_manifold_edges;
-    row.values["nm_vertices"] = report.non_manifold_vertices;
-    row.values["flipped"] = report.inconsistent_edges;
-    row.values["components"] = report.components;
+    row.values.update(Json{{"triangles", ended.mesh.triangle_count()},
+                           {"open", report.boundary_edges},
+                           {"nm_edges", report.non_manifold_edges},
+                           {"nm_vertices", report.non_manifold_vertices},
+                           {"flipped", report.inconsistent_edges},
+                           {"components", report.components}});
     if (report.self_intersections) row.values["crossing"] = report.self_intersections->pairs;
     row.broken = check.broken;
   }
@@ -155,40 +148,10 @@ class VolumesMeasurer {
   std::vector<MeasuredRow> rows_;
 };
 
-std::vector<MeasuredRow> measure_volumes(const MeasurementInput& input) {
-  return VolumesMeasurer(input).run();
-}
-
 }  // namespace
 
-Measurement volumes_measurement() {
-  const std::vector<MeasuredColumn> columns = {
-      {"origin", "origin", "where the volume comes from"},
-      {"sha256", "sha256", "of its file, the beginning"},
-      {"samples", "samples", "active samples"},
-      {"isovalue", "isovalue", "value of the surface, in the units of the data"},
-      {"ends", "ends", "treatment of the end of the data"},
-      {"reached", "reached", "ends that the surface runs into, by the grid's axes"},
-      {"triangles", "triangles", "a quad counting as two"},
-      {"seconds", "time [s]", "median, ends included"},
-      {"open", "open", "boundary edges"},
-      {"nm_edges", "nm e", "non-manifold edges"},
-      {"nm_vertices", "nm v", "non-manifold vertices"},
-      {"flipped", "flipped", "inconsistently oriented edges"},
-      {"components", "components", "connected components"},
-      {"crossing", "crossing", "self-intersecting pairs of triangles"}};
-  return {
-      .name = "volumes",
-      .summary = "scans, fog and level sets of other programs through the extractors",
-      .parameters = {{"every", "1", "takes every n-th sample of dense volumes along each axis", {}, 1, 64},
-                     {"repetitions", "3", "timed runs", {}, 1, 100},
-                     {"self_intersections", "yes", "whether they are counted", {"yes", "no"}},
-                     {"pixels", "300", "width of a picture; 0 draws none", {}, 0, 4000}},
-      .tables = {{"ct", "CT of a head", "extractor", columns},
-                 {"mri", "MRI of a brain", "extractor", columns},
-                 {"fog", "fog", "extractor", columns},
-                 {"level-set", "level set of a cube", "extractor", columns}},
-      .measure = measure_volumes};
+std::vector<MeasuredRow> measure_volumes(const MeasurementInput& input) {
+  return VolumesMeasurer(input).run();
 }
 
 }  // namespace hermesh

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <iterator>
 #include <sstream>
 
 #include "algorithms/io/atomic_file.h"
@@ -12,7 +13,7 @@
 namespace hermesh {
 namespace {
 
-/// One UTF-8 letter, which may be several bytes.
+/// Drops a UTF-8 character, which may have several bytes.
 void drop_last_letter(std::string& words) {
   while (!words.empty() && (static_cast<unsigned char>(words.back()) & 0xc0) == 0x80) words.pop_back();
   if (!words.empty()) words.pop_back();
@@ -52,6 +53,16 @@ std::vector<std::string> Canvas::lines(const std::string& text, double size, dou
       lines.push_back(word);
   }
   return lines;
+}
+
+void Canvas::captions(double x, double y, const std::string& label, const std::vector<std::string>& lines,
+                      double room) {
+  text(x, y + kLabelSize, label, kLabelSize, kInk, room, true);
+  double line = y + kLabelSize + 8 + kCaptionSize;
+  for (const std::string& caption : lines) {
+    text(x, line, caption, kCaptionSize, kQuiet, room);
+    line += kCaptionSize + 5;
+  }
 }
 
 void Canvas::image(double x, double y, const Image& picture) {
@@ -103,31 +114,42 @@ double Canvas::width_of(const std::string& words) const {
   return extents.x_advance;
 }
 
+std::vector<std::string> broken_captions(const std::vector<std::string>& captions, double room) {
+  Canvas ruler(1, 1);
+  std::vector<std::string> broken;
+  for (const std::string& caption : captions)
+    std::ranges::move(ruler.lines(caption, kCaptionSize, room), std::back_inserter(broken));
+  return broken;
+}
+
+double captions_height(std::size_t lines) {
+  return kLabelSize + 8 + static_cast<double>(lines) * (kCaptionSize + 5) + 4;
+}
+
+SheetGrid sheet_grid(std::size_t pictures, int most_columns) {
+  const int count = std::max(1, static_cast<int>(pictures));
+  const int rows = (count + most_columns - 1) / most_columns;
+  return {rows, (count + rows - 1) / rows};
+}
+
 void draw_panels(const std::filesystem::path& png, PanelSheet sheet) {
-  // Narrower panels would leave no room for what is said of them.
+  // Narrower panels would leave no room for captions.
   int cell_width = 260, cell_height = 1;
   for (const Panel& panel : sheet.panels) {
     cell_width = std::max(cell_width, panel.image.width);
     cell_height = std::max(cell_height, panel.image.height);
   }
   std::size_t caption_lines = 0;
-  Canvas ruler(1, 1);
   for (Panel& panel : sheet.panels) {
-    std::vector<std::string> broken;
-    for (const std::string& caption : panel.captions)
-      for (std::string& line : ruler.lines(caption, kCaptionSize, cell_width))
-        broken.push_back(std::move(line));
-    panel.captions = std::move(broken);
+    panel.captions = broken_captions(panel.captions, cell_width);
     caption_lines = std::max(caption_lines, panel.captions.size());
   }
-  // As few rows as the widest sheet needs, and then evenly filled.
-  const int count = std::max(1, static_cast<int>(sheet.panels.size()));
-  const int blocks = (count + sheet.columns - 1) / sheet.columns, columns = (count + blocks - 1) / blocks;
-  const double text_height = kLabelSize + 8 + static_cast<double>(caption_lines) * (kCaptionSize + 5) + 4;
+  const auto [blocks, columns] = sheet_grid(sheet.panels.size(), sheet.columns);
+  const double text_height = captions_height(caption_lines);
   const double block_height = text_height + cell_height + kGap;
   const int width = static_cast<int>(2 * kMargin + columns * cell_width + (columns - 1) * kGap);
   const double room = width - 2 * kMargin;
-  const std::vector<std::string> subtitle = ruler.lines(sheet.subtitle, kSubtitleSize, room);
+  const std::vector<std::string> subtitle = Canvas(1, 1).lines(sheet.subtitle, kSubtitleSize, room);
   const double header = kMargin + kTitleSize + 10 +
                         static_cast<double>(subtitle.size()) * (kSubtitleSize + 5) +
                         (sheet.legend.empty() ? 0 : kCaptionSize + 14) + 8;
@@ -152,12 +174,7 @@ void draw_panels(const std::filesystem::path& png, PanelSheet sheet) {
     const double x = kMargin + static_cast<double>(static_cast<int>(i) % columns) * (cell_width + kGap);
     const double top = header + static_cast<double>(static_cast<int>(i) / columns) * block_height;
     const double picture = std::ceil(top + text_height);
-    canvas.text(x, top + kLabelSize, panel.label, kLabelSize, kInk, cell_width, true);
-    double line = top + kLabelSize + 8 + kCaptionSize;
-    for (const std::string& caption : panel.captions) {
-      canvas.text(x, line, caption, kCaptionSize, kQuiet, cell_width);
-      line += kCaptionSize + 5;
-    }
+    canvas.captions(x, top, panel.label, panel.captions, cell_width);
     canvas.image(x, picture, panel.image);
     canvas.frame(x, picture, panel.image.width, panel.image.height, kQuiet, 0.8);
   }

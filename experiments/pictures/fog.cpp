@@ -15,7 +15,7 @@ using Eigen::Vector3i;
 
 constexpr double kStep = 0.5;        // voxels
 constexpr double kShadowStep = 1.0;  // voxels
-constexpr int kShadowEvery = 2;      // voxels between two places whose shadow is marched
+constexpr int kShadowEvery = 2;      // voxels between two points whose shadow is marched
 constexpr double kOpaque = 0.003;    // less than half a step of an 8-bit channel passes
 
 double trilinear(const std::vector<float>& values, const Vector3i& size, const Vector3d& at) {

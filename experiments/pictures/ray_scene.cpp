@@ -8,8 +8,15 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <optional>
 
-#include "experiments/pictures/embree.h"
+#if HERMESH_EMBREE_MAJOR == 4
+#include <embree4/rtcore.h>
+#elif HERMESH_EMBREE_MAJOR == 3
+#include <embree3/rtcore.h>
+#else
+#error "experiments/CMakeLists.txt says for which sources HERMESH_EMBREE_MAJOR is defined"
+#endif
 
 namespace hermesh {
 namespace {
@@ -22,6 +29,48 @@ constexpr int kOcclusionRays = 4;  // a sample, 16 a pixel: smooth enough at 400
 constexpr float kEdgePixels = 0.55f;  // half width of a drawn edge
 const Vector3f kBackgroundTop(0.955f, 0.963f, 0.972f), kBackgroundBottom(0.87f, 0.885f, 0.905f);
 const Vector3f kFront(0.80f, 0.775f, 0.735f), kBack(0.78f, 0.30f, 0.24f), kEdge(0.07f, 0.10f, 0.17f);
+
+// Embree 4 takes as optional arguments the parameters that Embree 3 took from a context.
+
+void find_first_hit(RTCScene scene, RTCRayHit& hit) {
+#if HERMESH_EMBREE_MAJOR == 4
+  rtcIntersect1(scene, &hit);
+#else
+  RTCIntersectContext context;
+  rtcInitIntersectContext(&context);
+  rtcIntersect1(scene, &context, &hit);
+#endif
+}
+
+/// Makes the ray's tfar negative if it hits anything.
+void find_any_hit(RTCScene scene, RTCRay& ray) {
+#if HERMESH_EMBREE_MAJOR == 4
+  rtcOccluded1(scene, &ray);
+#else
+  RTCIntersectContext context;
+  rtcInitIntersectContext(&context);
+  rtcOccluded1(scene, &context, &ray);
+#endif
+}
+
+RTCRay ray_from(const Vector3f& start, const Vector3f& direction, float distance) {
+  RTCRay ray{};
+  ray.org_x = start.x(), ray.org_y = start.y(), ray.org_z = start.z();
+  ray.dir_x = direction.x(), ray.dir_y = direction.y(), ray.dir_z = direction.z();
+  ray.tfar = distance;
+  ray.mask = ~0u;
+  return ray;
+}
+
+/// Returns the first hit of a ray, if there is one.
+std::optional<RTCRayHit> first_hit(RTCScene scene, const Vector3f& start, const Vector3f& direction) {
+  RTCRayHit hit{};
+  hit.ray = ray_from(start, direction, std::numeric_limits<float>::infinity());
+  hit.hit.geomID = RTC_INVALID_GEOMETRY_ID;
+  find_first_hit(scene, hit);
+  if (hit.hit.geomID == RTC_INVALID_GEOMETRY_ID) return std::nullopt;
+  return hit;
+}
 
 std::uint32_t hashed(std::uint32_t x) {
   x ^= x >> 16;
@@ -72,7 +121,7 @@ struct RayScene::Machinery {
   void add_triangles() {
     corners = triangulated(mesh);
     const RTCGeometry geometry = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_TRIANGLE);
-    // Embree reads 16 bytes at a point, so its own buffer of points is padded; the corners are shared.
+    // Embree reads 16 bytes per point, so its own buffer of points is padded; the corners are shared.
     float* points = static_cast<float*>(rtcSetNewGeometryBuffer(
         geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, 3 * sizeof(float), mesh.points.size()));
     if (points) std::copy_n(mesh.points.front().data(), 3 * mesh.points.size(), points);
@@ -110,7 +159,13 @@ Camera make_camera(double azimuth, double elevation) {
 
 namespace {
 
-/// Everything that one image needs, in single precision relative to the mesh's origin.
+/// Returns a distance from the centre of the view that is outside the box of the mesh.
+double reach_of(const PolygonMesh& mesh, const View& view) {
+  const Bounds box = bounds(mesh);
+  return box.empty() ? 1.0 : box.size().norm() + (0.5 * (box.lower + box.upper) - view.centre).norm();
+}
+
+/// The scene, camera and lights of an image, in single precision relative to the mesh's origin.
 struct Painter {
   RTCScene scene;
   const PolygonMesh& mesh;
@@ -125,17 +180,13 @@ struct Painter {
   }
 
   bool blocked(const Vector3f& from, const Vector3f& direction, float distance) const {
-    RTCRay ray{};
-    ray.org_x = from.x(), ray.org_y = from.y(), ray.org_z = from.z();
-    ray.dir_x = direction.x(), ray.dir_y = direction.y(), ray.dir_z = direction.z();
-    ray.tfar = distance;
-    ray.mask = ~0u;
+    RTCRay ray = ray_from(from, direction, distance);
     find_any_hit(scene, ray);
     return ray.tfar < 0.0f;
   }
 
-  /// Share of the sky that a point with this normal sees, by cosine-weighted rays; `seed` turns their
-  /// pattern.
+  /// Returns the share of the sky visible from a point with this normal, by cosine-weighted rays; `seed`
+  /// turns their pattern.
   float open_sky(const Vector3f& position, const Vector3f& normal, std::uint32_t seed) const {
     const Vector3f tangent = normal.unitOrthogonal(), bitangent = normal.cross(tangent);
     int open = 0;
@@ -151,9 +202,9 @@ struct Painter {
     return static_cast<float>(open) / kOcclusionRays;
   }
 
-  /// How much an edge covers this hit, 0 to 1. Distances to the edges are measured on the screen, where a
-  /// parallel projection keeps barycentric coordinates; the diagonal of a quad is left out, and edges fade
-  /// where polygons become smaller than a few pixels so that a dense mesh does not turn black.
+  /// Returns the coverage of a hit by an edge, 0 to 1. Distances to the edges are measured on the screen,
+  /// where a parallel projection preserves barycentric coordinates; the diagonal of a quad is left out, and
+  /// edges fade if polygons are smaller than a few pixels, so that a dense mesh does not turn black.
   float edge_cover(std::uint32_t triangle, float u, float v) const {
     std::array<Vector2f, 3> screen;
     for (int i = 0; i < 3; ++i) {
@@ -180,31 +231,23 @@ struct Painter {
   Vector3f sample(float x, float y, std::uint32_t seed) const {
     const Vector3f start = centre + (x - 0.5f * static_cast<float>(view.width)) * pixel * right +
                            (0.5f * static_cast<float>(view.height) - y) * pixel * up + far_away * towards;
-    RTCRayHit hit{};
-    hit.ray.org_x = start.x(), hit.ray.org_y = start.y(), hit.ray.org_z = start.z();
-    hit.ray.dir_x = -towards.x(), hit.ray.dir_y = -towards.y(), hit.ray.dir_z = -towards.z();
-    hit.ray.tfar = std::numeric_limits<float>::infinity();
-    hit.ray.mask = ~0u;
-    hit.hit.geomID = RTC_INVALID_GEOMETRY_ID;
-    find_first_hit(scene, hit);
-    if (hit.hit.geomID == RTC_INVALID_GEOMETRY_ID) return background(y);
-
-    Vector3f normal = Vector3f(hit.hit.Ng_x, hit.hit.Ng_y, hit.hit.Ng_z).normalized();
+    const auto hit = first_hit(scene, start, -towards);
+    if (!hit) return background(y);
+    Vector3f normal = Vector3f(hit->hit.Ng_x, hit->hit.Ng_y, hit->hit.Ng_z).normalized();
     const bool from_behind = normal.dot(towards) < 0.0f;
     if (from_behind) normal = -normal;
-    const Vector3f position = start - hit.ray.tfar * towards + 1e-3f * occlusion_radius * normal;
+    const Vector3f position = start - hit->ray.tfar * towards + 1e-3f * occlusion_radius * normal;
     const float sky = open_sky(position, normal, seed);
     const float key = std::max(0.0f, normal.dot(key_light));
     const float lit =
         key > 0.0f && !blocked(position, key_light, 3.0f * occlusion_radius) ? key : 0.25f * key;
     const float fill = 0.5f + 0.5f * normal.dot(up);
-    // A light at the viewer, without which what faces the viewer in the shadow of another part is nearly
-    // black.
+    // A light at the viewer, without which faces in the shadow of another part are nearly black.
     const float head = normal.dot(towards);
     Vector3f colour =
         to_linear(from_behind ? kBack : kFront) * (0.78f * lit + sky * (0.18f + 0.27f * fill) + 0.32f * head);
     if (view.edges)
-      colour += (to_linear(kEdge) - colour) * (0.7f * edge_cover(hit.hit.primID, hit.hit.u, hit.hit.v));
+      colour += (to_linear(kEdge) - colour) * (0.7f * edge_cover(hit->hit.primID, hit->hit.u, hit->hit.v));
     return colour;
   }
 
@@ -230,9 +273,7 @@ struct Painter {
 }  // namespace
 
 std::vector<Glimpse> RayScene::glimpses(const Camera& camera, const View& view, RunContext& context) const {
-  const Bounds box = bounds(machinery_->mesh);
-  const double reach =
-      box.empty() ? 1.0 : box.size().norm() + (0.5 * (box.lower + box.upper) - view.centre).norm();
+  const double reach = reach_of(machinery_->mesh, view);
   const double pixel = view.world_width / view.width;
   const Eigen::Vector3d centre = view.centre - machinery_->mesh.origin + reach * camera.towards;
   std::vector<Glimpse> seen(static_cast<std::size_t>(view.width) * view.height);
@@ -244,19 +285,13 @@ std::vector<Glimpse> RayScene::glimpses(const Camera& camera, const View& view, 
                                 (0.5 * view.height - row - 0.5) * pixel * camera.up)
                                    .cast<float>();
         const Vector3f ahead = (-camera.towards).cast<float>();
-        RTCRayHit hit{};
-        hit.ray.org_x = start.x(), hit.ray.org_y = start.y(), hit.ray.org_z = start.z();
-        hit.ray.dir_x = ahead.x(), hit.ray.dir_y = ahead.y(), hit.ray.dir_z = ahead.z();
-        hit.ray.tfar = std::numeric_limits<float>::infinity();
-        hit.ray.mask = ~0u;
-        hit.hit.geomID = RTC_INVALID_GEOMETRY_ID;
-        find_first_hit(machinery_->scene, hit);
-        if (hit.hit.geomID == RTC_INVALID_GEOMETRY_ID) continue;
+        const auto hit = first_hit(machinery_->scene, start, ahead);
+        if (!hit) continue;
         Glimpse& glimpse = seen[static_cast<std::size_t>(row) * view.width + column];
         glimpse.hit = true;
-        glimpse.normal = Vector3f(hit.hit.Ng_x, hit.hit.Ng_y, hit.hit.Ng_z).normalized();
+        glimpse.normal = Vector3f(hit->hit.Ng_x, hit->hit.Ng_y, hit->hit.Ng_z).normalized();
         if (glimpse.normal.dot(ahead) > 0.0f) glimpse.normal = -glimpse.normal;
-        glimpse.place = machinery_->mesh.origin + (start + hit.ray.tfar * ahead).cast<double>();
+        glimpse.place = machinery_->mesh.origin + (start + hit->ray.tfar * ahead).cast<double>();
       }
     }
   });
@@ -267,10 +302,6 @@ Image RayScene::render(const Camera& camera, const View& view, RunContext& conte
   const PolygonMesh& mesh = machinery_->mesh;
   const Vector3f right = camera.right.cast<float>(), up = camera.up.cast<float>(),
                  towards = camera.towards.cast<float>();
-  // The rays start outside the box of the mesh, wherever the view's centre lies in it.
-  const Bounds box = bounds(mesh);
-  const double reach =
-      box.empty() ? 1.0 : box.size().norm() + (0.5 * (box.lower + box.upper) - view.centre).norm();
   const Painter painter{machinery_->scene,
                         mesh,
                         machinery_->corners,
@@ -281,7 +312,7 @@ Image RayScene::render(const Camera& camera, const View& view, RunContext& conte
                         (-0.45f * right + 0.75f * up + 0.65f * towards).normalized(),
                         static_cast<float>(view.world_width / view.width),
                         static_cast<float>(view.occlusion_radius),
-                        static_cast<float>(reach),
+                        static_cast<float>(reach_of(mesh, view)),
                         view};
   Image image{view.width, view.height,
               std::vector<std::uint32_t>(static_cast<std::size_t>(view.width) * view.height)};

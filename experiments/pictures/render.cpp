@@ -10,7 +10,7 @@
 namespace hermesh {
 namespace {
 
-/// Where everything on the sheet goes, in pixels, and the two views that all pictures share.
+/// Positions on the sheet, in pixels, and the two views that all pictures share.
 struct Layout {
   int columns, blocks, width, height;
   double header, text_height, block_height;
@@ -18,7 +18,7 @@ struct Layout {
   double close_x, close_y, close_side;  ///< the close-up's outline inside the whole view
 };
 
-/// The box's extent along a direction, from its eight corners.
+/// Returns the extent of a box along a direction.
 std::pair<double, double> extent(const Bounds& box, const Eigen::Vector3d& direction) {
   double lower = std::numeric_limits<double>::infinity(), upper = -lower;
   for (int i = 0; i < 8; ++i) {
@@ -63,14 +63,12 @@ void set_views(Layout& layout, const Sheet& sheet, const Camera& camera) {
 Layout plan(const Sheet& sheet, const Camera& camera) {
   Layout layout{};
   set_views(layout, sheet, camera);
-  const int count = std::max<int>(1, static_cast<int>(sheet.pictures.size()));
-  // As few rows as the widest sheet needs, and then evenly filled: seven pictures are 4 + 3, six are 3 + 3.
-  layout.blocks = (count + sheet.columns - 1) / sheet.columns;
-  layout.columns = (count + layout.blocks - 1) / layout.blocks;
+  const SheetGrid grid = sheet_grid(sheet.pictures.size(), sheet.columns);
+  layout.blocks = grid.rows, layout.columns = grid.columns;
   std::size_t lines = 0;
   for (const Picture& picture : sheet.pictures) lines = std::max(lines, picture.captions.size());
   layout.header = kMargin + kTitleSize + (sheet.subtitle.empty() ? 0 : kSubtitleSize + 10) + 18;
-  layout.text_height = kLabelSize + 8 + static_cast<double>(lines) * (kCaptionSize + 5) + 4;
+  layout.text_height = captions_height(lines);
   layout.block_height = layout.text_height + layout.whole.height + kGap / 2 + layout.close.height + 2 * kGap;
   layout.width =
       static_cast<int>(2 * kMargin + layout.columns * sheet.cell_pixels + (layout.columns - 1) * kGap);
@@ -81,12 +79,7 @@ Layout plan(const Sheet& sheet, const Camera& camera) {
 void draw_picture(Canvas& canvas, const Picture& picture, const Layout& layout, const Camera& camera,
                   double x, double y, RunContext& context) {
   const int pixels = layout.whole.width;
-  canvas.text(x, y + kLabelSize, picture.label, kLabelSize, kInk, pixels, true);
-  double line = y + kLabelSize + 8 + kCaptionSize;
-  for (const std::string& caption : picture.captions) {
-    canvas.text(x, line, caption, kCaptionSize, kQuiet, pixels);
-    line += kCaptionSize + 5;
-  }
+  canvas.captions(x, y, picture.label, picture.captions, pixels);
   const PolygonMesh mesh = picture.load();
   const RayScene scene(mesh);
   const double top = y + layout.text_height, middle = top + layout.whole.height + kGap / 2;
@@ -98,21 +91,12 @@ void draw_picture(Canvas& canvas, const Picture& picture, const Layout& layout, 
   canvas.frame(x + 0.75, middle + 0.75, pixels - 1.5, layout.close.height - 1.5, kMark, 1.5);
 }
 
-void break_captions(std::vector<Picture>& pictures, double room) {
-  Canvas canvas(1, 1);
-  for (Picture& picture : pictures) {
-    std::vector<std::string> broken;
-    for (const std::string& caption : picture.captions)
-      for (std::string& line : canvas.lines(caption, kCaptionSize, room)) broken.push_back(std::move(line));
-    picture.captions = std::move(broken);
-  }
-}
-
 }  // namespace
 
 void render_sheet(const std::filesystem::path& png, Sheet sheet, RunContext& context) {
   const Stage stage(context, "picture");
-  break_captions(sheet.pictures, sheet.cell_pixels);
+  for (Picture& picture : sheet.pictures)
+    picture.captions = broken_captions(picture.captions, sheet.cell_pixels);
   const Camera camera = make_camera(sheet.viewpoint.azimuth, sheet.viewpoint.elevation);
   const Layout layout = plan(sheet, camera);
   Canvas canvas(layout.width, layout.height);

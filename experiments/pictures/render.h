@@ -1,5 +1,4 @@
-// Pictures of meshes: side by side from one camera, shaded, with a wireframe close-up. Rays by Embree,
-// drawing by Cairo.
+// Pictures of meshes from one camera, shaded, with a wireframe close-up. Rays by Embree, drawing by Cairo.
 #pragma once
 
 #include <array>
@@ -13,28 +12,28 @@
 
 namespace hermesh {
 
-/// Where the camera stands, in degrees. The y axis points up in every picture.
+/// Direction of the camera in degrees. The y axis points up in every picture.
 struct Viewpoint {
   double azimuth = 29.0;    ///< 0 looks at the box's +z side, 90 at its +x side
   double elevation = 20.0;  ///< above the horizon
 };
 
-/// What the close-up shows: a square about a point, both as fractions of the frame's box.
+/// The square of the close-up.
 struct CloseUp {
   std::array<double, 3> centre{0.5, 0.5, 0.5};  ///< along x, y and z of the box, 0 to 1
   double size = 0.12;  ///< side of the square, as a fraction of the box's longest side
-  bool edges = true;   ///< whether the polygons' edges are drawn
+  bool edges = true;   ///< true if the polygons' edges are drawn
 };
 
 struct Picture {
-  std::string label;                  ///< bold, the variant's name
-  std::vector<std::string> captions;  ///< a few figures below it, a line each, or more where one is too wide
+  std::string label;                  ///< bold
+  std::vector<std::string> captions;  ///< one or more lines each
   std::function<PolygonMesh()> load;  ///< called once, so that only one mesh at a time is in memory
 };
 
 struct Sheet {
   std::string title, subtitle;
-  Bounds frame;  ///< world units; the camera looks at this box, whatever the meshes are
+  Bounds frame;  ///< world units; the camera looks at this box
   CloseUp close_up;
   Viewpoint viewpoint;
   std::vector<Picture> pictures;
@@ -42,10 +41,10 @@ struct Sheet {
   int columns = 5;        ///< pictures side by side before the next row begins
 };
 
-/// Draws all meshes from one camera on one sheet, a PNG file: for each, the whole object shaded and a
-/// close-up with the polygons' edges drawn (a quad's diagonal is not drawn). Faces seen from behind are red,
-/// an empty mesh says "empty". The same sheet gives the same pixels at any thread count. Written aside and
-/// renamed.
+/// Draws all meshes from one camera on one sheet, a PNG file that is written atomically: for each, the whole
+/// object shaded and a close-up with the polygons' edges (without the diagonals of quads). Faces seen from
+/// behind are red, an empty mesh is labelled "empty". Equal sheets give equal pixels at any number of
+/// threads.
 /// @throws Error if the path cannot be written; Cancelled.
 void render_sheet(const std::filesystem::path& png, Sheet sheet, RunContext& context);
 

@@ -9,38 +9,15 @@
 namespace hermesh {
 namespace {
 
-std::uint32_t packed(const Tone& tone) {
-  const auto byte = [](double c) {
-    return static_cast<std::uint32_t>(std::lround(255.0 * std::clamp(c, 0.0, 1.0)));
+std::uint32_t packed(const Tone& tone, double brightness) {
+  const auto byte = [&](double c) {
+    return static_cast<std::uint32_t>(std::lround(255.0 * std::clamp(brightness * c, 0.0, 1.0)));
   };
   return 0xff000000u | byte(tone.red) << 16 | byte(tone.green) << 8 | byte(tone.blue);
 }
 
-Tone darker(const Tone& tone, double share) {
-  return {tone.red * share, tone.green * share, tone.blue * share};
-}
-
-openvdb::Coord place(const SliceFrame& frame, int u, int v) {
-  openvdb::Coord result;
-  result[frame.axis] = frame.at;
-  result[(frame.axis + 1) % 3] = u;
-  result[(frame.axis + 2) % 3] = v;
-  return result;
-}
-
 int extent(const SliceFrame& frame, int direction) {
   return frame.upper[direction] - frame.lower[direction] + 1;
-}
-
-template <class F>
-void for_each_sample(const LevelSet& level_set, const SliceFrame& frame, F&& f) {
-  const auto accessor = level_set.grid().grid->getConstAccessor();
-  for (int v = frame.lower[1]; v <= frame.upper[1]; ++v)
-    for (int u = frame.lower[0]; u <= frame.upper[0]; ++u) {
-      float value = 0.0f;
-      const bool active = accessor.probeValue(place(frame, u, v), value);
-      f(u, v, active, value);
-    }
 }
 
 }  // namespace
@@ -68,12 +45,20 @@ Image draw_slice(const LevelSet& level_set, const SliceFrame& frame, int pixels,
   std::vector<std::uint32_t> samples;
   samples.reserve(static_cast<std::size_t>(extent(frame, 0)) * extent(frame, 1));
   const double voxel = level_set.voxel_size();
-  for_each_sample(level_set, frame, [&](int, int, bool active, float value) {
-    Tone tone = value < 0.0f ? (active ? kInsideTone : kDeepTone) : (active ? kOutsideTone : kPaper);
-    if (active && contour > 0.0 && std::fmod(std::abs(value) / voxel, 2.0 * contour) >= contour)
-      tone = darker(tone, 0.78);
-    samples.push_back(packed(tone));
-  });
+  const auto accessor = level_set.grid().grid->getConstAccessor();
+  for (int v = frame.lower[1]; v <= frame.upper[1]; ++v)
+    for (int u = frame.lower[0]; u <= frame.upper[0]; ++u) {
+      openvdb::Coord at;
+      at[frame.axis] = frame.at;
+      at[(frame.axis + 1) % 3] = u;
+      at[(frame.axis + 2) % 3] = v;
+      float value = 0.0f;
+      const bool active = accessor.probeValue(at, value);
+      const Tone tone = value < 0.0f ? (active ? kInsideTone : kDeepTone) : (active ? kOutsideTone : kPaper);
+      const bool dark =
+          active && contour > 0.0 && std::fmod(std::abs(value) / voxel, 2.0 * contour) >= contour;
+      samples.push_back(packed(tone, dark ? 0.78 : 1.0));
+    }
   image.pixels.resize(static_cast<std::size_t>(image.width) * image.height);
   for (int y = 0; y < image.height; ++y)
     for (int x = 0; x < image.width; ++x) {
@@ -90,17 +75,6 @@ std::vector<LegendEntry> slice_legend() {
           {kInsideTone, "inside, in the band"},
           {kDeepTone, "inside, beyond the band"},
           {kPaper, "outside, beyond the band"}};
-}
-
-SliceCounts count_slice(const LevelSet& level_set, const SliceFrame& frame) {
-  SliceCounts counts;
-  for_each_sample(level_set, frame, [&](int, int, bool active, float value) {
-    if (value < 0.0f)
-      ++(active ? counts.active_inside : counts.inactive_inside);
-    else if (active)
-      ++counts.active_outside;
-  });
-  return counts;
 }
 
 }  // namespace hermesh

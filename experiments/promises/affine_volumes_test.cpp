@@ -1,20 +1,16 @@
 // Volumes under random affine maps, with values over the range of single precision: the meshes of certified
-// extractors do not intersect themselves.
+// extractors have no self-intersections.
 #include <gtest/gtest.h>
 #include <openvdb/openvdb.h>
 
 #include <Eigen/Geometry>
-#include <algorithm>
 #include <cmath>
-#include <limits>
 #include <random>
 
-#include "algorithms/core/level_set_grid.h"
-#include "algorithms/variants.h"
-#include "experiments/pipeline.h"
+#include "experiments/promises/methods_for_tests.h"
 
 namespace hermesh {
-namespace {
+namespace affine_volumes_test {
 
 using openvdb::Coord;
 
@@ -97,9 +93,7 @@ void expect_guarantees(std::uint32_t first, std::uint32_t count, std::uint32_t e
         continue;
       }
       ++meshes;
-      const Judgement judgement = judge(file, chosen.extractor.promises, kPromisesAlone, context);
-      EXPECT_TRUE(judgement.promises.broken.empty())
-          << promise_verdict(chosen.extractor.promises, judgement.promises);
+      test_methods::expect_guarantees(chosen.extractor.promises, file, context);
     }
   }
   EXPECT_LT(refused, (refused + meshes) / 5);
@@ -112,5 +106,5 @@ TEST(Slow, AffineVolumesTo1000) { expect_guarantees(500, 500, 3); }
 TEST(Slow, AffineVolumesTo1500) { expect_guarantees(1000, 500, 3); }
 TEST(Slow, AffineVolumesTo2000) { expect_guarantees(1500, 500, 3); }
 
-}  // namespace
+}  // namespace affine_volumes_test
 }  // namespace hermesh

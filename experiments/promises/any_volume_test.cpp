@@ -1,64 +1,42 @@
-// Volumes of every kind through each of our extractors: closed, or empty, or refused in a sentence.
-#include <gtest/gtest.h>
+// Volumes of every kind through each of our extractors: the mesh is closed or empty, or the volume is
+// refused.
 #include <openvdb/tools/LevelSetUtil.h>
 
-#include <algorithm>
-#include <cmath>
 #include <functional>
-#include <map>
-#include <ostream>
 #include <random>
 
-#include "algorithms/core/level_set_grid.h"
-#include "algorithms/variants.h"
-#include "experiments/pipeline.h"
+#include "experiments/promises/methods_for_tests.h"
 
 namespace hermesh {
-
-/// How a test names its variant; GoogleTest would print the bytes of the structure.
-inline void PrintTo(const Extractor& extractor, std::ostream* out) { *out << extractor.name; }
-
-namespace {
+namespace any_volume_test {
 
 using openvdb::Coord;
 using openvdb::FloatGrid;
 
 class AnyVolume : public testing::TestWithParam<Extractor> {
  protected:
+  /// Tolerance 0, since merging does not change which volumes are closed, and certifying it on noise takes
+  /// long.
   PolygonMesh extract(const FloatGrid::Ptr& grid, double isovalue, Ends ends = Ends::closed) {
-    // Which volumes are closed is decided before anything is merged, and noise takes a proving variant its
-    // time.
-    const auto& declared = GetParam().options;
-    const bool proves = std::any_of(declared.begin(), declared.end(),
-                                    [](const OptionSpec& option) { return option.name == "tolerance"; });
     GivenOptions given;
-    if (proves) given["tolerance"] = "0";
-    if (may_lose_crossings()) given["representation"] = "sparse-float";
-    const Options options(GetParam().name, declared, given);
-    const LevelSet volume = make_level_set(grid);
-    return hermesh::extract(volume, nullptr,
-                            {.chosen = {GetParam(), options}, .isovalue = isovalue, .ends = ends}, context)
-        .mesh;
+    if (test_methods::has_option(GetParam(), "tolerance")) given["tolerance"] = "0";
+    return test_methods::extract_all(GetParam(), make_level_set(grid), isovalue, ends, context, given).mesh;
   }
-  /// Expects of the extractor's mesh what it promises, and no boundary; returns how many triangles there are.
+  /// Expects the guarantees and no boundary; returns the number of triangles.
   std::size_t expect_closed(const FloatGrid::Ptr& grid, double isovalue) {
     SCOPED_TRACE("isovalue " + std::to_string(isovalue));
     const PolygonMesh mesh = extract(grid, isovalue);
     const MeshFile file = to_mesh_file(mesh);
     if (file.triangle_count() == 0) return 0;
     Promises promises = GetParam().promises;
-    // As printed it promises nothing, since its ten bytes lose crossings; of data that lose none its meshes
-    // are closed.
-    if (may_lose_crossings()) promises.closed = promises.oriented = true;
+    // As printed it guarantees nothing, since its ten bytes lose crossings; without losses its meshes are
+    // closed.
+    if (test_methods::has_option(GetParam(), "lost_crossings")) promises.closed = promises.oriented = true;
     EXPECT_TRUE(promises.closed && promises.oriented);
-    const Judgement judgement = judge(file, promises, kCounts, context);
-    EXPECT_TRUE(judgement.promises.broken.empty()) << promise_verdict(promises, judgement.promises);
-    for (std::size_t i = 0; i < mesh.points.size(); ++i) EXPECT_TRUE(mesh.points[i].allFinite());
+    const PromiseCheck check = judge(file, promises, kCounts, context).promises;
+    EXPECT_TRUE(check.broken.empty()) << promise_verdict(promises, check);
+    for (const Eigen::Vector3f& point : mesh.points) EXPECT_TRUE(point.allFinite());
     return file.triangle_count();
-  }
-  static bool may_lose_crossings() {
-    return std::ranges::any_of(GetParam().options,
-                               [](const OptionSpec& option) { return option.name == "lost_crossings"; });
   }
   RunContext context;
 };
@@ -77,34 +55,16 @@ FloatGrid::Ptr integers(int values, std::uint32_t seed) {
               [&](const Coord&) { return float(int(random() % std::uint32_t(values))); });
 }
 
-/// Level set of a ball of ten voxels; the band may be as narrow as one likes.
-FloatGrid::Ptr sphere(float width) {
-  constexpr float kVoxel = 0.5f;
-  initialize_openvdb();
-  const float background = width * kVoxel;
-  auto grid = FloatGrid::create(background);
-  grid->setGridClass(openvdb::GRID_LEVEL_SET);
-  grid->setTransform(openvdb::math::Transform::createLinearTransform(kVoxel));
-  for (const Coord& at : openvdb::CoordBBox(Coord(-16), Coord(16))) {
-    const auto distance = static_cast<float>(at.asVec3d().length() * kVoxel - 5.13f);
-    if (std::fabs(distance) < background)
-      grid->tree().setValueOn(at, distance);
-    else if (distance < 0)
-      grid->tree().setValueOff(at, -background);
-  }
-  return grid;
-}
+/// Returns the level set of a ball with a radius of ten voxels.
+FloatGrid::Ptr sphere(float width) { return test_methods::sphere_band(5.13f, 0.5f, width); }
 
 TEST_P(AnyVolume, IntegersAtIntegerIsovalues) {
   const FloatGrid::Ptr grid = integers(5, 1);
   for (const double isovalue : {0.0, 1.0, 2.0, 3.0, 0.5})
     EXPECT_GT(expect_closed(grid, isovalue), 0u) << isovalue;
-  // Nothing is greater than the greatest; below the least everything is inside, or the background's side
-  // turns.
-  EXPECT_EQ(expect_closed(grid, 4.0), 0u);
-  EXPECT_EQ(expect_closed(grid, 1e30), 0u);
-  EXPECT_EQ(expect_closed(grid, -1.0), 0u);
-  EXPECT_EQ(expect_closed(grid, -1e30), 0u);
+  // No value is greater than the greatest; below the least everything is inside, or the background changes
+  // sides.
+  for (const double isovalue : {4.0, 1e30, -1.0, -1e30}) EXPECT_EQ(expect_closed(grid, isovalue), 0u);
   EXPECT_GT(expect_closed(grid, -0.5), 0u);  // all of the box
 }
 
@@ -200,7 +160,7 @@ TEST_P(AnyVolume, NoiseThatFillsTheBoxIsClosedAndOpened) {
   const FloatGrid::Ptr grid = scan(Coord(20, 21, 22), -1.0f, [&](const Coord&) { return value(random); });
   EXPECT_GT(expect_closed(grid, 0.1), 0u);
   const PolygonMesh open = extract(grid, 0.1, Ends::open);
-  const auto report = validation::judge(to_mesh_file(open), kCounts, context);
+  const auto report = validation::check_mesh(to_mesh_file(open), kCounts, context);
   EXPECT_GT(report.boundary_edges, 100);
   EXPECT_EQ(report.inconsistent_edges, 0);
   for (std::size_t i = 0; i < open.points.size(); ++i) {
@@ -210,12 +170,7 @@ TEST_P(AnyVolume, NoiseThatFillsTheBoxIsClosedAndOpened) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Ours, AnyVolume, testing::ValuesIn(our_extractors().begin(), our_extractors().end()),
-                         [](const auto& param) {
-                           std::string name = param.param.name;
-                           for (char& c : name)
-                             if (c == '-') c = '_';
-                           return name;
-                         });
+                         test_methods::test_name);
 
-}  // namespace
+}  // namespace any_volume_test
 }  // namespace hermesh

@@ -1,7 +1,5 @@
-// Booleans of pairs of solids, judged on what their files would hold: closed, manifold, oriented, free of
-// self-intersection, volumes that add up, and the same bytes whichever solid comes first.
-#include <gtest/gtest.h>
-
+// Booleans of pairs of solids, validated on the contents of their files: closed, manifold, oriented, free of
+// self-intersection, volumes that add up, and the same bytes for either order of the solids.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -10,16 +8,14 @@
 #include <optional>
 #include <string>
 
-#include "algorithms/hermite/lost_slivers.h"
 #include "algorithms/hermite/solids.h"
 #include "algorithms/remesh/thin_parts.h"
-#include "algorithms/variants.h"
-#include "experiments/pipeline.h"
+#include "experiments/promises/methods_for_tests.h"
 #include "experiments/promises/solids_for_tests.h"
 #include "validation/geometry/triangle_tree.h"
 
 namespace hermesh {
-namespace {
+namespace combine_test {
 
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
@@ -116,7 +112,7 @@ Pair thin(Random& random) {
           turned_solid(random, at), voxel};
 }
 
-/// Polygons that overlap, twice, turned about, open, or no solid at all.
+/// Polygons that overlap, are duplicated, flipped or open, or enclose no solid at all.
 Pair dirty(Random& random) {
   RunContext context;
   const double voxel = 3.0 / random.uniform(12.0, 30.0);
@@ -194,10 +190,9 @@ class Pairs {
 
  private:
   SampledSolid sampled(const PolygonMesh& mesh) {
-    const VoxelizeRecipe recipe{.chosen = choose(our_voxelizers(), "hermesh"),
-                                .voxel_size = lattice_.voxel_size};
     return sample_solid(mesh, lattice_, [&](const PolygonMesh& framed) {
-      return solid_of(framed, voxelize(framed, recipe, context_), ThinRule::drop, context_).solid;
+      const LevelSet level_set = test_methods::voxelized(framed, lattice_.voxel_size, context_);
+      return solid_of(framed, level_set, ThinRule::drop, context_).solid;
     });
   }
   PolygonMesh contour(Boolean boolean, const SampledSolid& a, const SampledSolid& b) {
@@ -216,14 +211,10 @@ class Pairs {
     }
     ++(mesh.empty() ? counts.empty : counts.written);
     if (mesh.empty()) return 0.0;
-    const Promises all{true, true, true, true};
-    const Judgement judgement = judge(to_mesh_file(mesh), all, kPromisesAlone, context_);
-    EXPECT_EQ(promise_verdict(all, judgement.promises),
-              "promises closed, manifold, oriented, no self-intersection: kept");
-    return judgement.report.volume;
+    return test_methods::expect_guarantees({true, true, true, true}, to_mesh_file(mesh), context_).volume;
   }
   double volume(const PolygonMesh& mesh) {
-    return validation::judge(to_mesh_file(mesh), kCounts, context_).volume;
+    return validation::check_mesh(to_mesh_file(mesh), kCounts, context_).volume;
   }
 
   const Pair pair_;
@@ -260,8 +251,8 @@ void check_pairs(std::uint64_t seed, int of_each_kind) {
   }
 }
 
-/// The judged mesh's mean distance to the circle in which a ball of radius 1 about zero meets the plane z =
-/// 0.31, turned.
+/// The mesh's mean distance to the circle in which a ball of radius 1 about zero meets the plane z = 0.31,
+/// rotated.
 double mean_distance_to_circle(const PolygonMesh& mesh, const Matrix3d& turn) {
   const validation::TriangleTree tree{validation::TriangleSoup(to_mesh_file(mesh))};
   const double radius = std::sqrt(1.0 - 0.31 * 0.31);
@@ -299,5 +290,5 @@ TEST(CombineSolids, ResultsAreWatertightAddUpAndCommute) { check_pairs(1, 1); }
 
 TEST(Slow, ResultsOf430PairsAreWatertightAddUpAndCommute) { check_pairs(1000, 54); }
 
-}  // namespace
+}  // namespace combine_test
 }  // namespace hermesh

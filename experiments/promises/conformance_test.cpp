@@ -1,35 +1,20 @@
-// What every variant of the table owes, tested for each of them: its own promises on awkward volumes, the
-// same bytes at any thread count, and a sane answer to empty, full and broken volumes. A new variant is
-// tested here without a line.
-#include <gtest/gtest.h>
+// Requirements of every extractor, including new ones: its guarantees on awkward volumes, the same bytes at
+// any number of threads, and defined results for empty, full and invalid volumes.
 #include <tbb/global_control.h>
 
-#include <algorithm>
 #include <atomic>
 #include <cmath>
 #include <cstdlib>
 #include <functional>
 #include <iostream>
-#include <map>
-#include <ostream>
 #include <random>
 
 #include "algorithms/lattice/leaf_table.h"
-#include "algorithms/variants.h"
 #include "experiments/cases/test_volumes.h"
-#include "experiments/pipeline.h"
+#include "experiments/promises/methods_for_tests.h"
 
 namespace hermesh {
-
-/// How a test names its variant; GoogleTest would print the bytes of the structure.
-void PrintTo(const Extractor& extractor, std::ostream* out) { *out << extractor.name; }
-
-namespace {
-
-std::vector<Extractor> table() {
-  const auto ours = our_extractors();
-  return {ours.begin(), ours.end()};
-}
+namespace conformance_test {
 
 PolygonMesh extract(const Extractor& extractor, const LevelSet& volume, double isovalue = 0.0,
                     const GivenOptions& given = {}) {
@@ -41,19 +26,16 @@ PolygonMesh extract(const Extractor& extractor, const LevelSet& volume, double i
 
 validation::MeshReport judge_counts(const MeshFile& mesh) {
   RunContext context;
-  return validation::judge(mesh, kCounts, context);
+  return validation::check_mesh(mesh, kCounts, context);
 }
 
 void expect_promises(const Extractor& extractor, const MeshFile& mesh,
                      const Circumstances& circumstances = {}) {
   if (mesh.triangle_count() == 0) return;
   RunContext context;
-  const Promises& promises = extractor.promises;
-  const auto& [report, check] =
-      judge(mesh, promises, promises.no_self_intersection ? kPromisesAlone : kCounts, context, circumstances);
-  EXPECT_TRUE(check.broken.empty() && check.unchecked.empty()) << promise_verdict(promises, check);
-  // More than the table says of them: those of ours that are manifold have no polygon without area, either.
-  if (promises.manifold) {
+  const auto report = test_methods::expect_guarantees(extractor.promises, mesh, context, circumstances);
+  // Beyond the guarantees, our manifold meshes have no degenerate polygons.
+  if (extractor.promises.manifold) {
     EXPECT_EQ(report.degenerate_polygons + report.duplicate_polygons, 0);
   }
 }
@@ -70,13 +52,9 @@ class Conformance : public testing::TestWithParam<Extractor> {
     expect_promises(extractor(), to_mesh_file(extract(extractor(), volume, isovalue, given)),
                     {.encloses_the_outside = volume.background() < isovalue});
   }
-  bool proves() const {
-    return std::any_of(extractor().options.begin(), extractor().options.end(),
-                       [](const OptionSpec& option) { return option.name == "tolerance"; });
-  }
-  /// Expects the variant's promises on noise. One that proves its tolerance takes its time over noise, in
-  /// which nothing can be merged: it gets the volume of `size` as its uniform mesh, and that of `smaller` as
-  /// it comes.
+  bool proves() const { return test_methods::has_option(extractor(), "tolerance"); }
+  /// Expects the guarantees on noise, in which nothing can be merged. Extractors that certify a tolerance
+  /// take long there: they make the uniform mesh of the volume of `size`, and an adaptive one of `smaller`.
   void expect_on_noise(int size, int smaller, const std::function<LevelSet(int)>& volume,
                        double isovalue = 0.0) const {
     if (!proves()) return expect_on(volume(size), isovalue);
@@ -85,8 +63,7 @@ class Conformance : public testing::TestWithParam<Extractor> {
   }
 };
 
-/// Extracts in a process of its own. Ends with 0, or with 1 after a sentence, so that whoever starts it can
-/// tell both from a signal.
+/// Ends the process with 0, or with 1 after a message.
 [[noreturn]] void extract_and_exit(const Extractor& extractor, const LevelSet& volume) {
   try {
     extract(extractor, volume);
@@ -97,7 +74,7 @@ class Conformance : public testing::TestWithParam<Extractor> {
   std::_Exit(0);
 }
 
-/// Volumes in which every kind of block has a neighbour that is not there.
+/// Returns volumes in which every kind of block lacks a neighbour.
 std::vector<LevelSet> volumes_with_open_ends() {
   std::mt19937 random(11);
   std::uniform_real_distribution<float> value(-1.0f, 1.0f);
@@ -108,7 +85,7 @@ std::vector<LevelSet> volumes_with_open_ends() {
           make_volume({8, 8, 8}, 1.0f, [](int x, int y, int z) { return x * y * z == 343 ? -1.0f : 1.0f; })};
 }
 
-/// How a variant fares that looks up samples in all directions without asking whether there is a block.
+/// Returns an extractor that reads samples without checking that their block exists.
 Extractor careless_extractor() {
   Extractor careless = find_variant(our_extractors(), "marching-cubes");
   careless.name = "careless";
@@ -135,7 +112,7 @@ void expect_no_signal(const Extractor& extractor) {
   }
 }
 
-TEST(Carelessness, IsToldInASentenceAndNotByASignal) {
+TEST(MissingBlocks, AreReportedWithoutASignal) {
   testing::GTEST_FLAG(death_test_style) = "threadsafe";
   EXPECT_EXIT(extract_and_exit(careless_extractor(), volumes_with_open_ends()[1]), testing::ExitedWithCode(1),
               "the volume has no leaf");
@@ -226,8 +203,7 @@ TEST_P(Conformance, EmptyAndFullVolumesGiveEmptyMeshes) {
 }
 
 TEST_P(Conformance, OneVoxelInsideIsOneClosedComponent) {
-  // At a block's first and last sample, so that the cells around it lie in blocks that the tree does not
-  // have.
+  // At a block's first and last sample, so that the cells around it lie in blocks that do not exist.
   for (const int at : {0, 7, 8, 15}) {
     const PolygonMesh mesh = extract(extractor(), make_volume({16, 16, 16}, 1.0f, [&](int x, int y, int z) {
                                        return x == at && y == at && z == at ? -1.0f : 1.0f;
@@ -269,12 +245,9 @@ TEST_P(Conformance, PromisesHoldAfterARoundTripThroughStl) {
   expect_promises(extractor(), back);
 }
 
-INSTANTIATE_TEST_SUITE_P(Ours, Conformance, testing::ValuesIn(table()), [](const auto& param) {
-  std::string name = param.param.name;
-  for (char& c : name)
-    if (c == '-') c = '_';
-  return name;
-});
+INSTANTIATE_TEST_SUITE_P(Ours, Conformance,
+                         testing::ValuesIn(our_extractors().begin(), our_extractors().end()),
+                         test_methods::test_name);
 
 /// The whole million of random sign patterns, a tenth of which every run of the tests does.
 TEST(Slow, MarchingCubesOnAMillionRandomPatterns) {
@@ -290,5 +263,5 @@ TEST(Slow, MarchingCubesOnAMillionRandomPatterns) {
                         100 + batch))));
 }
 
-}  // namespace
+}  // namespace conformance_test
 }  // namespace hermesh

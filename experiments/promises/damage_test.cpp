@@ -1,36 +1,200 @@
-// Volumes and experiment files that something has damaged: an answer or a short sentence, never a crash, a
-// hang or gigabytes.
-#include "experiments/promises/damage.h"
-
+// Damaged volumes: a result or a short message, never a crash, a hang or gigabytes.
 #include <gtest/gtest.h>
 #include <openvdb/io/Stream.h>
 #include <openvdb/tools/LevelSetSphere.h>
 #include <openvdb/tools/LevelSetUtil.h>
+#include <signal.h>
+#include <sys/mman.h>
+#include <sys/wait.h>
 #include <tbb/global_control.h>
 #include <unistd.h>
 #include <zlib.h>
 
+#include <array>
+#include <bit>
+#include <chrono>
+#include <cstring>
 #include <fstream>
+#include <limits>
+#include <random>
 #include <sstream>
 
 #include "algorithms/core/level_set_grid.h"
 #include "algorithms/extraction/volume_attributes.h"
 #include "algorithms/extraction/volume_ends.h"
-#include "algorithms/hermite/hermite_file.h"
 #include "algorithms/hermite/samplers.h"
 #include "algorithms/io/grid_frame.h"
 #include "algorithms/io/import/files_for_tests.h"
 #include "algorithms/io/import/import_volume.h"
 #include "algorithms/io/vdb_file.h"
-#include "experiments/cases/cases.h"
-#include "experiments/harness/measurement.h"
+#include "algorithms/thesis/voxels/hermite_file.h"
 #include "experiments/variants.h"
 
 namespace hermesh {
-namespace {
+namespace damage_test {
 
 namespace fs = std::filesystem;
-using damage::Mutator;
+
+constexpr std::size_t kLongestSentence = 300;  ///< bytes
+constexpr double kLongestSeconds = 5.0;
+constexpr long kMostGrowth = 1 << 20;  ///< KiB
+
+/// Returns a value of /proc/self/status in KiB.
+long status_of(const std::string& name) {
+  std::ifstream status("/proc/self/status");
+  for (std::string word; status >> word;) {
+    long value = 0;
+    if (word == name + ":" && status >> value) return value;
+  }
+  return 0;
+}
+
+/// Memory shared with the child processes.
+struct Shared {
+  int current;
+  char wrong[600];
+};
+
+/// Returns the violation of attempt(i), "" if there is none.
+std::string verdict(int i, const std::function<void(int)>& attempt) {
+  std::ofstream("/proc/self/clear_refs") << "5";  // resets the peak
+  const long before = status_of("VmRSS");
+  const auto start = std::chrono::steady_clock::now();
+  std::string wrong;
+  try {
+    attempt(i);
+  } catch (const Error& error) {
+    const std::string said = error.what();
+    if (said.empty() || said.size() > kLongestSentence)
+      wrong = "a sentence of " + std::to_string(said.size()) + " bytes: " + said;
+    if (std::ranges::any_of(said, [](unsigned char c) { return c < 0x20 || c == 0x7f; }))
+      wrong = "control characters: " + said;
+  } catch (const std::exception& other) {
+    wrong = std::string("an exception of another kind: ") + other.what();
+  }
+  const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - start;
+  if (seconds.count() > kLongestSeconds) wrong += " " + std::to_string(seconds.count()) + " seconds";
+  const long growth = status_of("VmHWM") - before;
+  if (growth > kMostGrowth) wrong += " " + std::to_string(growth) + " KiB more memory";
+  return wrong;
+}
+
+[[noreturn]] void work(int first, int count, const std::function<void(int)>& attempt, Shared& shared) {
+  for (int i = first; i < count; ++i) {
+    shared.current = i;
+    alarm(30);
+    const std::string wrong = verdict(i, attempt);
+    if (wrong.empty()) continue;
+    wrong.copy(shared.wrong, sizeof shared.wrong - 1);
+    _exit(1);
+  }
+  _exit(0);
+}
+
+/// Calls attempt(0) to attempt(count − 1), which read damaged files, in child processes that may crash. An
+/// attempt must return, or throw an Error of one short line without control characters, within five seconds
+/// and without taking a GiB. Returns the violations, at most ten.
+std::vector<std::string> failures(int count, const std::function<void(int)>& attempt) {
+  auto* const shared = static_cast<Shared*>(
+      mmap(nullptr, sizeof(Shared), PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0));
+  std::vector<std::string> found;
+  constexpr std::size_t kEnough = 10;
+  for (int next = 0; next < count && found.size() < kEnough; next = shared->current + 1) {
+    *shared = {next, ""};
+    const pid_t child = fork();
+    if (child == 0) work(next, count, attempt, *shared);
+    int status = 0;
+    waitpid(child, &status, 0);
+    if (WIFEXITED(status) && WEXITSTATUS(status) == 0) break;
+    const std::string at = "attempt " + std::to_string(shared->current) + ": ";
+    found.push_back(at + (WIFSIGNALED(status) ? "signal " + std::to_string(WTERMSIG(status))
+                                              : std::string(shared->wrong)));
+  }
+  munmap(shared, sizeof(Shared));
+  return found;
+}
+
+/// Changes bytes, cuts, exchanges numbers and inserts parts of other files; equal for equal seeds.
+class Mutator {
+ public:
+  explicit Mutator(std::uint64_t seed) : random_(seed) {}
+
+  /// Returns a file of `whole` with one to three changes.
+  std::string operator()(const std::vector<std::string>& whole) {
+    std::string bytes = whole[below(whole.size())];
+    for (std::size_t left = 1 + below(3); left > 0 && !bytes.empty(); --left) switch (below(6)) {
+        case 0:
+          change_bytes(bytes);
+          break;
+        case 1:
+          cut(bytes);
+          break;
+        case 2:
+          exchange(bytes);
+          break;
+        case 3:
+          splice(bytes, whole[below(whole.size())]);
+          break;
+        default:
+          put_number(bytes);
+      }
+    return bytes;
+  }
+
+ private:
+  std::size_t below(std::size_t end) { return end == 0 ? 0 : random_() % end; }
+  void change_bytes(std::string& bytes) {
+    for (std::size_t left = 1 + below(8); left > 0; --left) {
+      char& byte = bytes[below(bytes.size())];
+      byte = below(2) ? static_cast<char>(byte ^ (1 << below(8))) : static_cast<char>(random_());
+    }
+  }
+  void cut(std::string& bytes) {
+    const std::size_t at = below(bytes.size());
+    if (below(2))
+      bytes.resize(at);
+    else
+      bytes.erase(at, 1 + below(below(4) ? 16 : bytes.size()));
+  }
+  void put_number(std::string& bytes) {
+    constexpr std::uint64_t kNumbers[] = {0,
+                                          1,
+                                          2,
+                                          4,
+                                          6,
+                                          16,
+                                          255,
+                                          4096,
+                                          0x7fffffff,
+                                          0x80000000,
+                                          0xffffffff,
+                                          0x7ff8000000000000,
+                                          0x8000000000000000,
+                                          0xffffffffffffffff};
+    std::uint64_t number = below(4) ? kNumbers[below(std::size(kNumbers))] : random_() >> below(64);
+    if (below(5) == 0)
+      number = std::bit_cast<std::uint32_t>(below(2) ? std::numeric_limits<float>::quiet_NaN() : 1e38f);
+    if (below(4) == 0) number = ~number + 1;
+    const std::size_t size = std::size_t{1} << below(4), at = below(bytes.size());
+    for (std::size_t i = 0; i < size && at + i < bytes.size(); ++i)
+      bytes[at + i] = static_cast<char>(number >> (8 * i));
+  }
+  void exchange(std::string& bytes) {
+    const std::size_t size = std::size_t{1} << below(4);
+    if (bytes.size() < 2 * size) return;
+    const std::size_t a = below(bytes.size() - size), b = below(bytes.size() - size);
+    for (std::size_t i = 0; i < size; ++i) std::swap(bytes[a + i], bytes[b + i]);
+  }
+  void splice(std::string& bytes, const std::string& other) {
+    const std::size_t from = below(other.size()), length = 1 + below(below(3) ? 64 : other.size());
+    const std::string part = other.substr(from, length);
+    const std::size_t at = below(bytes.size());
+    bytes.replace(at, below(2) ? part.size() : 0, part);
+  }
+
+  std::mt19937_64 random_;
+};
+
 using Files = std::vector<std::string>;
 
 std::string bytes_of(const fs::path& path) {
@@ -46,10 +210,9 @@ class Damage : public testing::Test {
   }
   ~Damage() override { fs::remove_all(folder); }
 
-  /// Expects all attempts to end as they should; `read` gets the number of one, and writes and reads the
-  /// damaged file.
+  /// `read` gets the number of an attempt, and writes and reads the damaged file.
   static void expect_answers(int count, const std::function<void(int)>& read) {
-    for (const std::string& failure : damage::failures(count, read)) ADD_FAILURE() << failure;
+    for (const std::string& failure : failures(count, read)) ADD_FAILURE() << failure;
   }
   fs::path put(const std::string& name, const std::string& bytes) {
     std::ofstream(folder / name, std::ios::binary) << bytes;
@@ -63,7 +226,7 @@ class Damage : public testing::Test {
   void raw(int count);
 
   fs::path folder;
-  // Child processes have no threads but the one that made them.
+  // Child processes have only the thread that made them.
   tbb::global_control one_thread{tbb::global_control::max_allowed_parallelism, 1};
 };
 class Slow : public Damage {};
@@ -75,7 +238,7 @@ openvdb::FloatGrid::Ptr sphere() {
   return grid;
 }
 
-/// The sphere's values in a tree of another type.
+/// Returns the sphere's values in a tree of another type.
 template <class Grid, class Value>
 typename Grid::Ptr converted(const char* name, Value&& value) {
   const auto from = sphere();
@@ -113,8 +276,8 @@ std::string written(const openvdb::GridCPtrVec& grids, std::uint32_t compression
   return bytes_of(path);
 }
 
-/// Files of other programs: types, compressions, grids that share a tree, and a stream without places of
-/// grids.
+/// Returns files of other programs: types, compressions, grids that share a tree, and a stream without grid
+/// offsets.
 Files foreign_files(const fs::path& path) {
   using namespace openvdb;
   const auto half = sphere();
@@ -148,7 +311,7 @@ Files foreign_files(const fs::path& path) {
   return files;
 }
 
-/// Reads of a volume all that commands read.
+/// Reads everything in a volume that commands read.
 void read_volume(const fs::path& path) {
   RunContext context;
   std::optional<Error> first;
@@ -185,7 +348,7 @@ void Damage::foreign(int count) {
   expect_answers(count, [&](int i) { read_volume(put("a.vdb", Mutator(std::uint64_t(i))(whole))); });
 }
 
-/// The file with the checksum at its end made to fit again.
+/// Returns the file with the checksum at its end corrected.
 std::string resealed(std::string bytes) {
   if (bytes.size() < 100) return bytes;
   const std::size_t size = bytes.size() - 12;
@@ -263,7 +426,7 @@ void Damage::raw(int count) {
     std::mt19937_64 random{std::uint64_t(i)};
     const fs::path path = put("a.raw", Mutator(std::uint64_t(i))(whole));
     const auto size = static_cast<std::int64_t>(fs::file_size(path));
-    RawLayout layout{.dims = {12, 11, 10}, .format = {SampleType(random() % 10), random() % 2 == 0}};
+    RawLayout layout{.dims = {12, 11, 10}, .format = {NumberType(random() % 10), random() % 2 == 0}};
     if (random() % 2)
       layout.dims = {std::max<std::int64_t>(1, size / std::int64_t(size_of(layout.format.type))), 1, 1};
     if (random() % 4 == 0) layout.dims[random() % 3] = std::int64_t(random() >> (random() % 64));
@@ -283,5 +446,5 @@ TEST_F(Slow, HermiteData) { hermite(kMany); }
 TEST_F(Slow, Nifti) { nifti(kMany); }
 TEST_F(Slow, RawSamples) { raw(kMany); }
 
-}  // namespace
+}  // namespace damage_test
 }  // namespace hermesh

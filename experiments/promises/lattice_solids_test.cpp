@@ -1,11 +1,10 @@
-// Solids whose faces lie in planes of samples: what comes out of each voxelizer and sign rule is the solid,
-// the whole solid and nothing else. All right values are closed forms of whole numbers.
+// Solids whose faces lie in planes of samples: each voxelizer and sign rule gives exactly the solid. All
+// expected values are closed forms of whole numbers.
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <functional>
 #include <map>
 #include <random>
 #include <set>
@@ -19,7 +18,7 @@
 #include "experiments/variants.h"
 
 namespace hermesh {
-namespace {
+namespace lattice_solids_test {
 
 using Cell = std::array<int, 3>;
 using Cells = std::set<Cell>;
@@ -76,7 +75,7 @@ void fill(Cells& cells, const Cell& low, const Cell& high) {
       for (int z = low[2]; z < high[2]; ++z) cells.insert({x, y, z});
 }
 
-/// What a solid amounts to, in units of its cells.
+/// Measures of a solid, in units of its cells.
 struct Amounts {
   int components = 0;  ///< components of the solid's surface
   double volume = 0.0, area = 0.0;
@@ -85,65 +84,58 @@ struct Amounts {
 struct Solid {
   std::string name;
   Soup soup;
-  Amounts flooded, wound;   ///< what each rule for signs must find
-  bool parity = false;      ///< whether rays that count crossings find the wound solid, too
-  bool has_cavity = false;  ///< bounded by a shell that faces inwards, which `auto` keeps
+  Amounts flooded, wound;   ///< expected for each rule of signs
+  bool parity = false;      ///< ray parity also finds the wound solid
+  bool has_cavity = false;  ///< bounded by a shell that faces inwards, which `auto` preserves
 };
 
+struct Box {
+  Cell low, high;
+  int out = 1;
+};
+Soup boxes(const std::vector<Box>& all) {
+  Soup soup;
+  for (const auto& [low, high, out] : all) soup.add_box(low, high, out);
+  return soup;
+}
+Soup border_of(const std::vector<Box>& all) {
+  Cells cells;
+  for (const Box& box : all) fill(cells, box.low, box.high);
+  return border(cells);
+}
+
 std::vector<Solid> solids() {
-  std::vector<Solid> all;
-  const auto add = [&](const std::string& name, const Soup& soup, const Amounts& amounts, bool parity) {
-    all.push_back({name, soup, amounts, amounts, parity});
-  };
-  Soup s;
-  s.add_box({0, 0, 0}, {4, 1, 1});
-  s.add_box({3, 0, 0}, {6, 1, 1});
-  add("overlapping", s, {1, 6, 26}, false);
-  s = {};
-  s.add_box({0, 0, 0}, {2, 2, 2});
-  s.add_box({1, 1, 1}, {3, 3, 3});
-  add("overlapping at corners", s, {1, 15, 42}, false);
-  s = {};
-  s.add_box({0, 0, 0}, {3, 1, 1});
-  s.add_box({3, 0, 0}, {6, 1, 1});
-  add("stacked", s, {1, 6, 26}, true);
-  s = {};
-  s.add_box({0, 0, 0}, {3, 3, 2});
-  s.add_box({1, 1, 2}, {2, 2, 4});
-  add("touching in a part of a face", s, {1, 20, 50}, true);
-  s = {};
-  s.add_box({0, 0, 0}, {4, 4, 4});
-  s.add_box({1, 1, 1}, {3, 3, 3});
-  add("nested", s, {1, 64, 96}, false);
-  s = {};
-  s.add_box({0, 0, 0}, {4, 4, 4});
-  s.add_box({1, 1, 1}, {3, 3, 3}, -1);
-  all.push_back({"with a cavity", s, {1, 64, 96}, {2, 56, 120}, true, true});
-  s = {};  // the same two boxes share a face
-  s.add_box({0, 0, 0}, {4, 4, 4});
-  s.add_box({0, 1, 1}, {2, 3, 3});
-  add("nested with a common face", s, {1, 64, 96}, false);
-  s = {};
+  std::vector<Box> bricks, stairs;
   for (int row = 0; row < 3; ++row)
     for (int brick = 0; brick < 3; ++brick)
-      s.add_box({2 * brick + row % 2, 0, row}, {2 * brick + 2 + row % 2, 1, row + 1});
-  add("bricks", s, {1, 18, 58}, true);
-  s = border([] {
-    Cells cells;
-    fill(cells, {0, 0, 0}, {4, 1, 1});
-    return cells;
-  }());
-  s.add_square({2, 0, 0}, 0, 1, 1, true);
-  add("single-walled", s, {1, 4, 18}, false);
-  Cells stairs;
-  for (int step = 0; step < 4; ++step) fill(stairs, {step, 0, 0}, {step + 1, 2, step + 1});
-  add("stairs", border(stairs), {1, 20, 52}, true);
-  Cells letter;
-  fill(letter, {0, 0, 0}, {1, 4, 2});
-  fill(letter, {0, 0, 0}, {3, 1, 2});
-  fill(letter, {0, 3, 0}, {2, 4, 2});
-  add("extruded", border(letter), {1, 14, 46}, true);
-  return all;
+      bricks.push_back({{2 * brick + row % 2, 0, row}, {2 * brick + 2 + row % 2, 1, row + 1}});
+  for (int step = 0; step < 4; ++step) stairs.push_back({{step, 0, 0}, {step + 1, 2, step + 1}});
+  Soup walled = border_of({{{0, 0, 0}, {4, 1, 1}}});
+  walled.add_square({2, 0, 0}, 0, 1, 1, true);
+  const auto same = [](const char* name, const Soup& soup, const Amounts& amounts, bool parity) {
+    return Solid{name, soup, amounts, amounts, parity};
+  };
+  return {
+      same("overlapping", boxes({{{0, 0, 0}, {4, 1, 1}}, {{3, 0, 0}, {6, 1, 1}}}), {1, 6, 26}, false),
+      same("overlapping at corners", boxes({{{0, 0, 0}, {2, 2, 2}}, {{1, 1, 1}, {3, 3, 3}}}), {1, 15, 42},
+           false),
+      same("stacked", boxes({{{0, 0, 0}, {3, 1, 1}}, {{3, 0, 0}, {6, 1, 1}}}), {1, 6, 26}, true),
+      same("touching in a part of a face", boxes({{{0, 0, 0}, {3, 3, 2}}, {{1, 1, 2}, {2, 2, 4}}}),
+           {1, 20, 50}, true),
+      same("nested", boxes({{{0, 0, 0}, {4, 4, 4}}, {{1, 1, 1}, {3, 3, 3}}}), {1, 64, 96}, false),
+      {"with a cavity",
+       boxes({{{0, 0, 0}, {4, 4, 4}}, {{1, 1, 1}, {3, 3, 3}, -1}}),
+       {1, 64, 96},
+       {2, 56, 120},
+       true,
+       true},
+      same("nested with a common face", boxes({{{0, 0, 0}, {4, 4, 4}}, {{0, 1, 1}, {2, 3, 3}}}), {1, 64, 96},
+           false),
+      same("bricks", boxes(bricks), {1, 18, 58}, true),
+      same("single-walled", walled, {1, 4, 18}, false),
+      same("stairs", border_of(stairs), {1, 20, 52}, true),
+      same("extruded", border_of({{{0, 0, 0}, {1, 4, 2}}, {{0, 0, 0}, {3, 1, 2}}, {{0, 3, 0}, {2, 4, 2}}}),
+           {1, 14, 46}, true)};
 }
 
 /// A map of the lattice onto itself that exchanges axes and turns their signs.
@@ -221,8 +213,8 @@ void expect_amounts(const validation::MeshReport& report, const Amounts& right, 
   EXPECT_EQ(report.boundary_edges, 0);
 }
 
-/// Expects all rules to find what the solid amounts to. The oracle takes a hundred times as long as the rest,
-/// and is asked `with_oracle` alone.
+/// Expects the amounts from all rules; from the oracle, which takes a hundred times as long, only
+/// `with_oracle`.
 void check(const Solid& solid, const Turn& turn, unsigned octant, double voxel_size, bool with_oracle) {
   constexpr double kUnit = 10.0;  // a multiple of every voxel size
   const PolygonMesh mesh = to_mesh(solid.soup, turn, octant, float(kUnit));
@@ -283,8 +275,8 @@ TEST(LatticeSolids, ThinSlabsStay) {
   check({"fin", fin, right, right, true}, all[0], 0, 10.0, true);
 }
 
-/// Two cubes overlap, and the walls of the overlap lie in planes of samples, too. From within both cubes the
-/// nearest surface is a side of one of them that lies outside of the other.
+/// Two cubes overlap, and the walls of the overlap also lie in planes of samples. Within both cubes the
+/// nearest surface is a side of one of them outside of the other.
 TEST(LatticeSolids, DistancesPassOverWallsWithin) {
   Soup soup;
   soup.add_box({0, 0, 0}, {2, 2, 2});
@@ -373,7 +365,7 @@ Border measure(const Cells& cells) {
   return result;
 }
 
-/// Checks so many random unions of boxes whose border is a manifold; the slow tier takes 500.
+/// Checks random unions of boxes whose border is a manifold.
 void check_random_unions(int count, unsigned seed) {
   std::mt19937 random(seed);
   const auto number = [&](int low, int high) { return low + int(random() % unsigned(high - low + 1)); };
@@ -391,7 +383,7 @@ void check_random_unions(int count, unsigned seed) {
       soup.add_box(low, high);
       fill(cells, low, high);
     }
-    // Flooding fills what is closed in.
+    // Flooding fills enclosed cavities.
     Cells flooded;
     fill(flooded, {0, 0, 0}, {16, 16, 16});
     std::vector<Cell> stack{{0, 0, 0}};
@@ -441,5 +433,5 @@ TEST(Slow, LatticeSolidsAreWholeAtEachVoxelSizeOctantAndAxisOrder) {
             check(solid, all[i], octant, voxel_size, i == 3 * octant && voxel_size >= 1.0);
 }
 
-}  // namespace
+}  // namespace lattice_solids_test
 }  // namespace hermesh

@@ -1,7 +1,5 @@
 // Bodies of one to four voxels: a closed component of an output never has negative volume, in any extractor
 // that guarantees orientation, in Booleans and in fractures.
-#include <gtest/gtest.h>
-
 #include <cstdint>
 #include <optional>
 #include <string>
@@ -10,13 +8,12 @@
 #include "algorithms/fracture/fracture.h"
 #include "algorithms/hermite/solids.h"
 #include "algorithms/remesh/thin_parts.h"
-#include "algorithms/variants.h"
 #include "experiments/fracture/fracture_for_tests.h"
-#include "experiments/pipeline.h"
+#include "experiments/promises/methods_for_tests.h"
 #include "experiments/promises/solids_for_tests.h"
 
 namespace hermesh {
-namespace {
+namespace small_bodies_test {
 
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
@@ -76,7 +73,7 @@ PolygonMesh small_body(Random& random, double spread) {
 
 /// Expects that no component has a negative volume; convex bodies have no cavities.
 void expect_outwards(const MeshFile& mesh, RunContext& context) {
-  const validation::MeshReport report = validation::judge(mesh, kCounts, context);
+  const validation::MeshReport report = validation::check_mesh(mesh, kCounts, context);
   EXPECT_EQ(report.boundary_edges + report.inconsistent_edges, 0);
   EXPECT_EQ(report.inside_out_components.value_or(0), 0);
   EXPECT_GE(report.volume, 0.0);
@@ -88,13 +85,11 @@ void check_extractors(std::uint64_t seed, int bodies) {
     Random random(double(seed + std::uint64_t(i)));
     const PolygonMesh mesh = small_body(random, 8.0);
     RunContext context;
-    const VoxelizeRecipe recipe{.chosen = choose(our_voxelizers(), "hermesh"), .voxel_size = 1.0};
-    const LevelSet volume = voxelize(mesh, recipe, context);
+    const LevelSet volume = test_methods::voxelized(mesh, 1.0, context);
     for (const Extractor& extractor : our_extractors()) {
       if (!extractor.promises.oriented) continue;
       for (const char* tolerance : {"0", "0.1", "1"}) {
-        const bool merges =
-            std::ranges::any_of(extractor.options, [](const OptionSpec& o) { return o.name == "tolerance"; });
+        const bool merges = test_methods::has_option(extractor, "tolerance");
         if (!merges && tolerance != std::string("0")) continue;
         SCOPED_TRACE("body " + std::to_string(i) + ", " + extractor.name + ", tolerance " + tolerance);
         const GivenOptions given = merges ? GivenOptions{{"tolerance", tolerance}} : GivenOptions{};
@@ -116,10 +111,10 @@ void check_booleans(std::uint64_t seed, int pairs) {
     RunContext context;
     const SharedLattice lattice = shared_lattice(a, b, 1.0);
     const auto sampled = [&](const PolygonMesh& mesh) -> std::optional<SampledSolid> {
-      const VoxelizeRecipe recipe{.chosen = choose(our_voxelizers(), "hermesh"), .voxel_size = 1.0};
       try {
         return sample_solid(mesh, lattice, [&](const PolygonMesh& framed) {
-          return solid_of(framed, voxelize(framed, recipe, context), ThinRule::drop, context).solid;
+          const LevelSet level_set = test_methods::voxelized(framed, 1.0, context);
+          return solid_of(framed, level_set, ThinRule::drop, context).solid;
         });
       } catch (const Error&) {
         return std::nullopt;  // it has no sample inside
@@ -149,8 +144,7 @@ void check_fractures(std::uint64_t seed, int bodies) {
     Random random(double(seed + std::uint64_t(i)));
     const PolygonMesh mesh = small_body(random, 8.0);
     RunContext context;
-    const LevelSet volume =
-        voxelize(mesh, {.chosen = choose(our_voxelizers(), "hermesh"), .voxel_size = 1.0}, context);
+    const LevelSet volume = test_methods::voxelized(mesh, 1.0, context);
     const FloatHermite object = sample_polygons(volume, 0.0, mesh, context);
     if (object.leaves.empty()) continue;
     const Bounds box = bounds(mesh);
@@ -180,5 +174,5 @@ TEST(Slow, NoExtractorTurns10000SmallBodiesInsideOut) { check_extractors(100'000
 TEST(Slow, NoBooleanTurns10000PairsOfSmallBodiesInsideOut) { check_booleans(200'000, 10'000); }
 TEST(Slow, NoFractureTurns10000SmallBodiesInsideOut) { check_fractures(300'000, 10'000); }
 
-}  // namespace
+}  // namespace small_bodies_test
 }  // namespace hermesh

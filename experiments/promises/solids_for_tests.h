@@ -1,4 +1,4 @@
-// Solids for tests of what becomes of them in world coordinates.
+// Solids for tests of their meshes in world coordinates.
 #pragma once
 
 #include <Eigen/Geometry>
@@ -6,7 +6,7 @@
 #include <numbers>
 
 #include "algorithms/io/mesh_file.h"
-#include "experiments/cases/recipe_random.h"
+#include "experiments/cases/recipe_shapes.h"
 #include "experiments/cases/recipes.h"
 
 namespace hermesh::test_solids {

@@ -2,22 +2,18 @@
 // thicker than a voxel, turned and moved at random. Voxels are 1 wide.
 #include "algorithms/remesh/thin_parts.h"
 
-#include <gtest/gtest.h>
-
 #include <functional>
 #include <string>
 #include <vector>
 
-#include "algorithms/core/level_set_grid.h"
 #include "algorithms/remesh/shell.h"
-#include "algorithms/variants.h"
-#include "experiments/pipeline.h"
+#include "experiments/promises/methods_for_tests.h"
 #include "experiments/promises/solids_for_tests.h"
 #include "validation/geometry/triangle_soup.h"
 #include "validation/visible_loss.h"
 
 namespace hermesh {
-namespace {
+namespace thin_parts_test {
 
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
@@ -30,7 +26,7 @@ struct Surface {
   const char* name;
   std::function<Vector3d(double u, double v)> at;
   int across, along;                 ///< squares along u and v
-  bool closes_u, closes_v, twisted;  ///< u = 1 is u = 0, with v turned about if twisted
+  bool closes_u, closes_v, twisted;  ///< u = 1 is u = 0, with v reversed if twisted
   int components, genus;             ///< of the boundary of the solid around it
 };
 
@@ -136,10 +132,7 @@ struct Kept {
 };
 
 Kept keep(const PolygonMesh& polygons, RunContext& context, ThinRule rule = ThinRule::keep) {
-  const LevelSet level_set =
-      voxelize(polygons,
-               {.chosen = choose(our_voxelizers(), "hermesh", {{"signs", "auto-sheets"}}), .voxel_size = 1.0},
-               context);
+  const LevelSet level_set = test_methods::voxelized(polygons, 1.0, context, {{"signs", "auto-sheets"}});
   Kept kept{solid_of(polygons, level_set, rule, context), {}};
   if (kept.solid.solid.hermite.leaves.empty()) return kept;
   kept.mesh = extract(kept.solid.solid.level_set, nullptr,
@@ -160,13 +153,13 @@ void expect_kept(const Surface& surface, double thickness, std::uint64_t seed) {
   const Kept kept = keep(polygons, context);
   ASSERT_FALSE(kept.mesh.empty());
   const MeshFile file = to_mesh_file(kept.mesh), model = to_mesh_file(polygons);
-  validation::JudgeOptions options = kPromisesAlone;
+  validation::CheckOptions options = kPromisesAlone;
   options.reference = &model;
   options.samples = 20'000;
   options.solid_samples = 0;
   options.voxel_size = 1.0;
   options.visible_samples = 5'000;
-  const validation::MeshReport report = validation::judge(file, options, context);
+  const validation::MeshReport report = validation::check_mesh(file, options, context);
   EXPECT_TRUE(report.watertight());
   EXPECT_EQ(report.components, surface.components);
   EXPECT_EQ(report.genus.value_or(-1.0), double(surface.genus));
@@ -208,7 +201,7 @@ TEST(ThinParts, OfAPlateAreOneAndAFifthVoxelsThick) {
       Random random(seed);
       const Kept kept = keep(
           moved(wall(surfaces()[0], thickness), random_turn(random), random_vector(random, 3.0)), context);
-      const double volume = validation::judge(to_mesh_file(kept.mesh), kCounts, context).volume;
+      const double volume = validation::check_mesh(to_mesh_file(kept.mesh), kCounts, context).volume;
       EXPECT_GT(volume, 24 * 17 * 1.1);
       EXPECT_LT(volume, 24 * 17 * 1.25 + 2 * (24 + 17) * 1.2);
       ASSERT_TRUE(kept.solid.thin);
@@ -255,5 +248,5 @@ TEST(VisibleLoss, OfAHoleIsItsShare) {
   EXPECT_GT(loss(model, turned).lost.value, 0.99);
 }
 
-}  // namespace
+}  // namespace thin_parts_test
 }  // namespace hermesh

@@ -1,8 +1,6 @@
-// Surfaces that run into the end of the data: closed flat or left open, by each of our extractors and
-// OpenVDB's.
+// Surfaces that run into the end of the data: closed flat or left open, by our extractors and OpenVDB's.
 #include "algorithms/extraction/volume_ends.h"
 
-#include <gtest/gtest.h>
 #include <openvdb/tools/LevelSetUtil.h>
 
 #include <Eigen/Geometry>
@@ -10,22 +8,16 @@
 #include <cmath>
 #include <functional>
 #include <map>
-#include <ostream>
 #include <random>
 
-#include "algorithms/core/level_set_grid.h"
-#include "algorithms/variants.h"
-#include "experiments/pipeline.h"
+#include "experiments/promises/methods_for_tests.h"
 #include "reference/variants.h"
 
 namespace hermesh {
-
-/// How a test names its variant; GoogleTest would print the bytes of the structure.
-inline void PrintTo(const Extractor& extractor, std::ostream* out) { *out << extractor.name; }
-
-namespace {
+namespace volume_ends_test {
 
 using openvdb::Coord;
+using test_methods::sphere_band;
 using Field = std::function<float(int, int, int)>;
 
 openvdb::FloatGrid::Ptr dense(const Coord& lower, const Coord& upper, float background, const Field& value) {
@@ -43,26 +35,8 @@ openvdb::FloatGrid::Ptr ball(double z) {
   });
 }
 
-/// A level set of a sphere about the origin; OpenVDB's own function makes none with a band of a voxel or
-/// less.
-openvdb::FloatGrid::Ptr level_set_sphere(float radius, float voxel, float width) {
-  initialize_openvdb();
-  const float background = width * voxel;
-  auto grid = openvdb::FloatGrid::create(background);
-  grid->setGridClass(openvdb::GRID_LEVEL_SET);
-  grid->setTransform(openvdb::math::Transform::createLinearTransform(voxel));
-  for (const Coord& at : openvdb::CoordBBox(Coord(-26), Coord(26))) {
-    const auto distance = static_cast<float>(at.asVec3d().length() * voxel - radius);
-    if (std::fabs(distance) < background)
-      grid->tree().setValueOn(at, distance);
-    else if (distance < 0)
-      grid->tree().setValueOff(at, -background);
-  }
-  return grid;
-}
-
-/// The grid as openvdb::tools::clip() leaves it, which does not compile as C++20: what is not kept is
-/// inactive background.
+/// Clips like openvdb::tools::clip(), which does not compile as C++20: other voxels become inactive
+/// background.
 openvdb::FloatGrid::Ptr clip(const openvdb::FloatGrid::Ptr& grid, int reach,
                              const std::function<bool(const Coord&)>& keep) {
   const openvdb::FloatGrid::Ptr clipped = grid->deepCopy();
@@ -73,10 +47,10 @@ openvdb::FloatGrid::Ptr clip(const openvdb::FloatGrid::Ptr& grid, int reach,
 
 validation::MeshReport counts_of(const PolygonMesh& mesh) {
   RunContext context;
-  return validation::judge(to_mesh_file(mesh), kCounts, context);
+  return validation::check_mesh(to_mesh_file(mesh), kCounts, context);
 }
 
-/// Points on edges that have one polygon.
+/// Returns the points of edges with one polygon.
 std::vector<Eigen::Vector3d> boundary_points(const PolygonMesh& mesh) {
   std::map<std::pair<std::uint32_t, std::uint32_t>, int> uses;
   const auto add = [&](const auto& polygon) {
@@ -98,18 +72,6 @@ std::vector<Extractor> table() {
   std::vector<Extractor> all(ours.begin(), ours.end());
   all.push_back(find_variant(reference_extractors(), "openvdb"));
   return all;
-}
-
-EndedMesh extract_by(const Extractor& extractor, const LevelSet& volume, double isovalue, Ends ends,
-                     RunContext& context) {
-  // Holes of crossings that the thesis's ten bytes lose are not what is asked here.
-  const bool may_lose_crossings = std::ranges::any_of(
-      extractor.options, [](const OptionSpec& option) { return option.name == "lost_crossings"; });
-  GivenOptions given;
-  if (may_lose_crossings) given["representation"] = "sparse-float";
-  const Options options(extractor.name, extractor.options, given);
-  return extract(volume, nullptr, {.chosen = {extractor, options}, .isovalue = isovalue, .ends = ends},
-                 context);
 }
 
 /// Returns 12³ samples under a turned map with scales that differ by axis: a slab, a wedge, a rod or a ball
@@ -144,7 +106,8 @@ void expect_no_vertex_beyond_caps(const Extractor& extractor, std::uint32_t cuts
   for (std::uint32_t seed = 0; seed < cuts; ++seed) {
     SCOPED_TRACE(extractor.name + ", cut " + std::to_string(seed));
     const openvdb::FloatGrid::Ptr grid = oblique_cut(seed);
-    const EndedMesh closed = extract_by(extractor, make_level_set(grid), 0.0, Ends::closed, context);
+    const EndedMesh closed =
+        test_methods::extract_all(extractor, make_level_set(grid), 0.0, Ends::closed, context);
     ended += closed.ends.any();
     double farthest = 0.0;  // from the middle, along any axis
     for (std::size_t i = 0; i < closed.mesh.points.size(); ++i) {
@@ -153,10 +116,7 @@ void expect_no_vertex_beyond_caps(const Extractor& extractor, std::uint32_t cuts
       for (int axis = 0; axis < 3; ++axis) farthest = std::max(farthest, std::abs(index[axis] - 5.5));
     }
     EXPECT_LE(farthest, 6.0 + 1e-4);
-    const Promises& promises = extractor.promises;
-    const auto judged = judge(to_mesh_file(closed.mesh), promises,
-                              promises.no_self_intersection ? kPromisesAlone : kCounts, context);
-    EXPECT_TRUE(judged.promises.broken.empty()) << promise_verdict(promises, judged.promises);
+    test_methods::expect_guarantees(extractor.promises, to_mesh_file(closed.mesh), context);
   }
   EXPECT_GT(ended, cuts * 9 / 10);
 }
@@ -164,14 +124,11 @@ void expect_no_vertex_beyond_caps(const Extractor& extractor, std::uint32_t cuts
 class VolumeEnds : public testing::TestWithParam<Extractor> {
  protected:
   EndedMesh extract(const LevelSet& volume, double isovalue, Ends ends) {
-    return extract_by(GetParam(), volume, isovalue, ends, context);
+    return test_methods::extract_all(GetParam(), volume, isovalue, ends, context);
   }
-  /// How far a cap may lie below its plane, in voxels. Where nothing may meet, points are not moved onto it
-  /// afterwards; then the uniform mesh is near it by its normals, and the tolerance of 0.1 comes on top.
-  double off() const {
-    const auto is_tolerance = [](const OptionSpec& option) { return option.name == "tolerance"; };
-    return std::ranges::any_of(GetParam().options, is_tolerance) ? 0.15 : 1e-6;
-  }
+  /// Largest distance of a cap below its plane, in voxels. Extractors without self-intersections do not move
+  /// points onto it afterwards: their uniform mesh is near it by its normals, plus the tolerance of 0.1.
+  double off() const { return test_methods::has_option(GetParam(), "tolerance") ? 0.15 : 1e-6; }
   RunContext context;
 };
 
@@ -198,19 +155,14 @@ TEST_P(VolumeEnds, HalfFilledBoxIsClosedHalfAVoxelBeyond) {
   EXPECT_NEAR(bounds(ended.mesh).upper.z(), 15.5, off());
 }
 
-/// Nothing may meet after the ends are closed: moving points onto the caps' planes made the
-/// mesh of a CT intersect itself.
-TEST_P(VolumeEnds, CapsKeepThePromiseThatNothingMeets) {
+/// Moving points onto the caps' planes made the mesh of a CT intersect itself.
+TEST_P(VolumeEnds, CapsSatisfyTheGuarantees) {
   std::mt19937 random(5);
   std::uniform_real_distribution<float> value(0.0f, 100.0f);
   const LevelSet noise = make_level_set(
       dense(Coord(0, 0, 0), Coord(11, 11, 11), -1.0f, [&](int, int, int) { return value(random); }));
-  const EndedMesh ended = extract(noise, 50.0, Ends::closed);
-  const Promises& promises = GetParam().promises;
-  const Judgement judgement = judge(to_mesh_file(ended.mesh), promises,
-                                    promises.no_self_intersection ? kPromisesAlone : kCounts, context);
-  EXPECT_TRUE(judgement.promises.broken.empty()) << promise_verdict(promises, judgement.promises);
-  EXPECT_EQ(judgement.report.boundary_edges, 0);
+  const MeshFile mesh = to_mesh_file(extract(noise, 50.0, Ends::closed).mesh);
+  EXPECT_EQ(test_methods::expect_guarantees(GetParam().promises, mesh, context).boundary_edges, 0);
 }
 
 TEST_P(VolumeEnds, CutBallHasAFlatCap) {
@@ -233,7 +185,7 @@ TEST_P(VolumeEnds, CutBallHasAFlatCap) {
       }
     }
     EXPECT_NEAR(bounds(ended.mesh).upper.z(), 15.5, off());
-    EXPECT_GE(cap, 4u);  // some extractors merge what is flat
+    EXPECT_GE(cap, 4u);  // some extractors merge flat regions
   }
 }
 
@@ -279,7 +231,7 @@ TEST_P(VolumeEnds, TurnedMirroredAndFarAway) {
 }
 
 TEST_P(VolumeEnds, ClippedLevelSet) {
-  const openvdb::FloatGrid::Ptr sphere = level_set_sphere(10.0f, 0.5f, 3.0f);
+  const openvdb::FloatGrid::Ptr sphere = sphere_band(10.0f, 0.5f, 3.0f);
   const openvdb::FloatGrid::Ptr clipped = clip(sphere, 26, [](const Coord& at) { return at.y() <= 6; });
   const int last = clipped->evalActiveVoxelBoundingBox().max().y();
   const EndedMesh closed = extract(make_level_set(clipped), 0.0, Ends::closed);
@@ -300,7 +252,7 @@ TEST_P(VolumeEnds, ClippedLevelSet) {
 }
 
 TEST_P(VolumeEnds, LevelSetClippedByAMaskIsClosedButCannotBeOpened) {
-  const openvdb::FloatGrid::Ptr sphere = level_set_sphere(10.0f, 0.5f, 3.0f);
+  const openvdb::FloatGrid::Ptr sphere = sphere_band(10.0f, 0.5f, 3.0f);
   const openvdb::FloatGrid::Ptr clipped =
       clip(sphere, 26, [](const Coord& at) { return (at - Coord(16, 2, 4)).asVec3d().length() < 12.0; });
   const EndedMesh closed = extract(make_level_set(clipped), 0.0, Ends::closed);
@@ -315,12 +267,7 @@ TEST_P(VolumeEnds, SameBytesEachTime) {
     EXPECT_TRUE(extract(volume, 1.0, ends).mesh == extract(volume, 1.0, ends).mesh);
 }
 
-INSTANTIATE_TEST_SUITE_P(All, VolumeEnds, testing::ValuesIn(table()), [](const auto& param) {
-  std::string name = param.param.name;
-  for (char& c : name)
-    if (c == '-') c = '_';
-  return name;
-});
+INSTANTIATE_TEST_SUITE_P(All, VolumeEnds, testing::ValuesIn(table()), test_methods::test_name);
 
 TEST(CloseEnds, LeavesVolumesWithoutEndsAlone) {
   RunContext context;
@@ -331,11 +278,11 @@ TEST(CloseEnds, LeavesVolumesWithoutEndsAlone) {
   };
   for (const float width : {0.6f, 1.0f, 1.5f, 3.0f, 8.0f})
     for (const double isovalue : {-0.2, 0.0, 0.2}) {
-      const openvdb::FloatGrid::Ptr sphere = level_set_sphere(5.0f, 0.5f, width);
+      const openvdb::FloatGrid::Ptr sphere = sphere_band(5.0f, 0.5f, width);
       expect_untouched(make_level_set(sphere), isovalue * width);
     }
   expect_untouched(make_level_set(ball(7.0)), 0.0);  // it does not reach the box
-  const openvdb::FloatGrid::Ptr fog = level_set_sphere(5.0f, 0.5f, 3.0f);
+  const openvdb::FloatGrid::Ptr fog = sphere_band(5.0f, 0.5f, 3.0f);
   openvdb::tools::sdfToFogVolume(*fog);
   expect_untouched(make_level_set(fog), 0.1);
   expect_untouched(make_level_set(openvdb::FloatGrid::create(1.0f)), 0.0);
@@ -358,5 +305,5 @@ TEST(CloseEnds, NoSampleOfTheDataChanges) {
   EXPECT_GT(changed, 50u);
 }
 
-}  // namespace
+}  // namespace volume_ends_test
 }  // namespace hermesh

@@ -87,7 +87,7 @@ def add_object(context, mesh, name, like):
     return item
 
 
-# ---- Where the mesh is fine: in an object, or in what the camera sees (Aldén 2011, §9.2).
+# ---- Masks: where the tolerance holds, in an object or in the view of the camera (Aldén 2011, §9.2).
 
 
 class Camera:
@@ -101,7 +101,7 @@ class Camera:
             raise ValueError("a panoramic camera's view is no frustum; choose another camera or an object for the mask")
         self.is_perspective, self.near, self.far = data.type == "PERSP", data.clip_start, data.clip_end
         self.frame = np.array(data.view_frame(scene=scene))  # corners of the picture in the camera's space, which looks along -z
-        # The camera's scale does not change what it sees.
+        # The camera's scale does not change its view.
         self.placement = np.array(scene.camera.matrix_world.normalized())
 
     def polygons(self, box):
@@ -157,7 +157,7 @@ def mask_of(context):
     return make
 
 
-# ---- What the panel shows of the last operator.
+# ---- Errors and notes of the last operator, for the panel.
 
 
 class Said:
@@ -237,7 +237,7 @@ class Operator:
 
     def begin(self, context):
         said.begin(self.bl_label, None)
-        # Blender may move what it keeps in memory meanwhile, and the user may make another object the active one.
+        # Blender may move its data in memory meanwhile, and the user may activate another object.
         self.item = context.active_object.name
         try:
             self.work = Work(self.prepare(context, context.active_object))
@@ -743,7 +743,7 @@ class HERMESH_PT_judge(SubPanel, bpy.types.Panel):
         box = layout.box()
         if settings.judged is not None:
             box.label(text=settings.judged.name, icon="OBJECT_DATA")
-        # What is more than the first sentence says where the defects are, which their buttons show.
+        # The other sentences describe the positions of the defects, which their buttons show.
         text = settings.verdict if settings.is_well else settings.verdict.splitlines()[0]
         wrapped(context, box, text, "CHECKMARK" if settings.is_well else "ERROR")
         if settings.defects:

@@ -111,7 +111,7 @@ assert not hermesh_blender.said.errors
 volumes = [item for item in bpy.data.objects if item.type == "VOLUME"]
 assert len(volumes) == 1 and volumes[0].name == "model volume"
 assert volumes[0].data.grids.load() and abs(volumes[0].data.grids[0].matrix_object[0][0] / (2 * voxel) - 1) < 1e-4
-# Written anew, it is the same object, and Blender reads the new file.
+# Written again, it is the same object, and Blender reads the new file.
 settings.resolution = resolution
 is_done(bpy.ops.hermesh.volume())
 volumes = [item for item in bpy.data.objects if item.type == "VOLUME"]
@@ -120,7 +120,7 @@ assert volumes[0].data.grids.load() and abs(volumes[0].data.grids[0].matrix_obje
 distances = hermesh.read_vdb(settings.file).sample(points[::97])
 assert np.abs(distances).mean() < 0.2 * voxel, np.abs(distances).mean() / voxel
 
-# A mesh of the volume, which is somewhere else than its file says; the object that was a mesh is refused.
+# A mesh of a volume object that was moved; a mesh object is refused.
 assert not bpy.ops.hermesh.extract.poll()
 volumes[0].location = (0.0, 0.0, 30.0)
 volumes[0].rotation_euler = (0.0, 0.0, np.pi / 2)
@@ -167,7 +167,7 @@ assert abs(seen / expected - 1) < 0.02, (seen, expected)
 assert len(coarse.points) < 0.8 * len(everywhere.points), (len(coarse.points), len(everywhere.points))
 bpy.data.objects.remove(box)
 
-# The mask by what a camera sees: with its picture shifted by half its width it sees that half, too.
+# The mask by the view of a camera; a picture shifted by half its width includes that half, too.
 is_refused(lambda: extracted(mask="camera"), "no camera")
 camera = bpy.data.objects.new("camera", bpy.data.cameras.new("camera"))
 bpy.context.collection.objects.link(camera)
@@ -187,7 +187,7 @@ camera.data.clip_end = 0.5 * extent
 is_refused(extracted, "the camera sees nothing")
 camera.data.type = "PANO"
 is_refused(extracted, "panoramic")
-# It is what the module's own frustum is, seen from beside the model.
+# The mask equals the frustum of the module.
 camera.data.type, camera.data.shift_x, camera.data.clip_end, camera.data.lens = "PERSP", 0.0, 1000.0, 200.0
 bpy.context.view_layer.update()
 ours = extracted(outside="nothing")[0]
@@ -247,7 +247,7 @@ assert fits.consistent, fits.sentences
 assert "surface" in pieces[0].data.attributes
 bpy.ops.ed.undo_push(message="broken")
 
-# Cut by an object there is what is in it and what is not; it does not cut itself.
+# An object cuts another into the parts inside and outside of it; it does not cut itself.
 bpy.ops.mesh.primitive_cube_add(size=extent, location=centre - [extent / 2, 0.0, 0.0] + [0.1 * extent, 0.0, extent / 2])
 cutter = bpy.context.active_object
 activate(pieces[0])
@@ -283,7 +283,7 @@ assert len(bpy.data.objects["model"].data.polygons) == polygons_after
 bpy.ops.ed.undo()
 assert len(bpy.data.objects["model"].data.polygons) == polygons_before
 
-# What Escape does: the work ends soon.
+# Escape ends the work soon.
 mesh = mesh_of(bpy.data.objects["model"])
 work = hermesh_blender.Work(lambda **watching: hermesh.remesh(mesh, resolution=700, **watching))
 time.sleep(0.5)

@@ -1,15 +1,14 @@
 #!/usr/bin/env bash
-# Whether another program can be built against what is installed: packages/cpp/check_package.sh BUILD [--shared]; a quarter of a
-# minute. With --shared what is checked is a build of shared libraries alone beside BUILD, whose objects ccache has from BUILD.
-# Installs the libraries and headers of a build into BUILD/package_check, compiles packages/cpp/example against them there, which
-# must take less than 20 s, and runs it; counts headers and symbols, and prints sizes. With shared libraries all that they show
-# must be public names. Inside another project no test of ours may be built, and no warning be an error. Exits with 1 and says
-# what is wrong.
+# Checks that another program can be built against the installed libraries: packages/cpp/check_package.sh BUILD [--shared]; a
+# quarter of a minute. With --shared it checks a build of shared libraries next to BUILD, whose objects ccache has from BUILD.
+# Installs the libraries and headers of a build into BUILD/package_check, compiles packages/cpp/example against them, which must
+# take less than 20 s, and runs it; counts headers and symbols, and prints sizes. Shared libraries must export only public names.
+# Inside another project no test of ours may be built, and no warning be an error. Exits with 1 and a message on failure.
 set -euo pipefail
 cd "$(dirname "$0")"
 build=$1
 if [ "${2:-}" = --shared ]; then
-  # A folder as deep as the other, from where ccache knows the objects.
+  # A directory of the same depth, so that ccache finds the objects.
   build=${build%/}_shared
   { (cd ../.. && cmake --preset release -B "$build" -DBUILD_SHARED_LIBS=ON -DHERMESH_BUILD_PROGRAM=OFF \
       -DHERMESH_BUILD_TESTS=OFF -DHERMESH_BUILD_PYTHON=OFF) && cmake --build "$build"; } > "$1/shared.log" 2>&1 ||
@@ -22,7 +21,7 @@ for component in runtime validation development; do
   cmake --install "$build" --prefix "$where/prefix" --component $component > "$where/install.log"
 done
 
-# Another program's headers must not be ours by accident: nothing but the public ones is there.
+# Only public headers may be installed, and they may include no others of ours.
 headers=$(find "$where/prefix/include" -type f | wc -l)
 inner=$(grep -rlE '#include ("algorithms/|"validation/|<Eigen|<tbb|<CGAL)' "$where/prefix/include" || true)
 if [ -n "$inner" ]; then echo "public headers include what is not installed: $inner"; exit 1; fi
@@ -33,14 +32,14 @@ find "$where/prefix" \( -name '*.a' -o -name '*.so*' \) -type f -printf 'library
 
 find "$where/prefix" -name '*.so' | sort | xargs -r ./check_symbols.sh
 
-# The strictest compilers that are here find nothing to warn of in the headers.
+# The headers compile without warnings.
 for compiler in g++ clang++; do
   if command -v $compiler > /dev/null; then
     $compiler -std=c++20 -Wall -Wextra -Wpedantic -Wshadow -Werror -fsyntax-only -I "$where/prefix/include" example/main.cpp
   fi
 done
 
-# What else runs on the machine does not count.
+# Processor time, so that other processes on the machine do not count.
 TIMEFORMAT="%R %U %S"
 { time { cmake -S example -B "$where/example" -G Ninja -DCMAKE_PREFIX_PATH="$where/prefix" && cmake --build "$where/example"; } \
     > "$where/example.log" 2>&1; } 2> "$where/took.txt" || { cat "$where/example.log"; exit 1; }

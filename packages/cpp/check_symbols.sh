@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# What shared libraries show: packages/cpp/check_symbols.sh LIBRARY...; an instant. Counts the names that each shows, and exits
-# with 1 where one is not public: another namespace's, or what the public functions share on the inside.
+# Checks the exported symbols of shared libraries: packages/cpp/check_symbols.sh LIBRARY...; an instant. Counts the names of each,
+# and exits with 1 if one is not public: of another namespace, or internal to the public functions.
 set -euo pipefail
 for library in "$@"; do
   names=$(nm -D --defined-only -C "$library" | sed -E 's/^[0-9a-f]* *[A-Za-z] //')

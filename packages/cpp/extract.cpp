@@ -1,20 +1,18 @@
-// Volumes to meshes, and the whole way from meshes to meshes.
+// Volumes to meshes, and meshes to meshes.
 #include "hermesh/extract.h"
 
 #include <cmath>
-#include <cstdlib>
 
 #include "algorithms/extraction/adaptivity_field.h"
 #include "algorithms/extraction/explain.h"
 #include "algorithms/extraction/frustum.h"
 #include "algorithms/extraction/volume_ends.h"
-#include "algorithms/hermite/lost_slivers.h"
 #include "algorithms/hermite/solids.h"
 #include "algorithms/lattice/placement.h"
+#include "algorithms/remesh/bounded_remesh.h"
 #include "algorithms/remesh/thin_parts.h"
 #include "algorithms/variants.h"
-#include "packages/cpp/solid_data.h"
-#include "packages/cpp/stages.h"
+#include "packages/cpp/inside.h"
 
 namespace hermesh::v1 {
 
@@ -42,24 +40,24 @@ struct ChosenExtractor {
 ChosenExtractor choose(const ExtractOptions& options, const std::string& fallback) {
   const Extractor& extractor =
       find_variant(our_extractors(), options.extractor.empty() ? fallback : options.extractor);
-  if (!std::isfinite(options.isovalue)) throw hermesh::Error("the isovalue must be a finite number");
-  if (options.ends != "closed" && options.ends != "open")
-    throw hermesh::Error("ends are closed or open, not '" + options.ends + "'");
+  require(std::isfinite(options.isovalue), "the isovalue must be a finite number");
+  require(options.ends == "closed" || options.ends == "open",
+          "ends are closed or open, not '" + options.ends + "'");
   return {extractor, hermesh::Options(extractor.name, extractor.options, options.options),
           options.ends == "open" ? Ends::open : Ends::closed};
 }
 
 Eigen::Vector3d vector(const std::array<double, 3>& v) { return {v[0], v[1], v[2]}; }
 
-/// Where the extractor keeps its bound, as the options say; nothing where they say nothing.
+/// Returns where the extractor keeps its bound; none without such options.
 std::optional<AdaptivityField> field_of(const ExtractOptions& options, const Extractor& extractor,
                                         RunContext& context) {
   using Outside = AdaptivityField::Outside;
-  if (options.mask && options.frustum) throw hermesh::Error("a mask and a frustum exclude one another");
+  require(!options.mask || !options.frustum, "a mask and a frustum exclude one another");
   const bool has_mask = options.mask || options.frustum;
-  if (options.outside != "simplify" && options.outside != "nothing" && options.outside != "everywhere")
-    throw hermesh::Error("outside is simplify, nothing or everywhere, not '" + options.outside + "'");
-  if (!has_mask && options.outside != "simplify") throw hermesh::Error("outside needs a mask or a frustum");
+  require(options.outside == "simplify" || options.outside == "nothing" || options.outside == "everywhere",
+          "outside is simplify, nothing or everywhere, not '" + options.outside + "'");
+  require(has_mask || options.outside == "simplify", "outside needs a mask or a frustum");
   if (!has_mask && !options.tolerance_grid) return std::nullopt;
   check_adaptive(extractor);
   AdaptivityField field;
@@ -68,9 +66,9 @@ std::optional<AdaptivityField> field_of(const ExtractOptions& options, const Ext
                                                                : Outside::simplify;
   if (options.mask) field.mask = Inside::level_set(options.mask);
   if (options.frustum) {
-    if (options.frustum_resolution < 8 || options.frustum_resolution > 4096)
-      throw hermesh::Error("the frustum's resolution must be from 8 to 4096, not " +
-                           std::to_string(options.frustum_resolution));
+    require(
+        options.frustum_resolution >= 8 && options.frustum_resolution <= 4096,
+        "the frustum's resolution must be from 8 to 4096, not " + std::to_string(options.frustum_resolution));
     const Frustum& f = *options.frustum;
     field.mask = frustum_mask({.position = vector(f.position),
                                .look_at = vector(f.look_at),
@@ -82,8 +80,7 @@ std::optional<AdaptivityField> field_of(const ExtractOptions& options, const Ext
                               options.frustum_resolution, context);
   }
   if (options.tolerance_grid) field.scale = Inside::level_set(options.tolerance_grid);
-  // What is wrong with one of them is said before the work.
-  FieldEvaluator(&field, IndexToWorld());
+  FieldEvaluator(&field, IndexToWorld());  // throws before the work if one of them is invalid
   return field;
 }
 
@@ -100,8 +97,8 @@ PolygonMesh mesh_of(const LevelSet& level_set, const PolygonMesh* source, bool o
                                        .written_in_single = options.written_in_single},
                                       chosen.ends);
   context.check();
-  if (ended.mesh.empty() && field && field->outside == AdaptivityField::Outside::nothing)
-    throw hermesh::Error("there is no surface inside the mask, nothing was written");
+  require(!ended.mesh.empty() || !field || field->outside != AdaptivityField::Outside::nothing,
+          "there is no surface inside the mask, nothing was written");
   if (ended.mesh.empty())
     throw hermesh::Error(no_surface(level_set, options.isovalue, of_polygons, chosen.extractor.name));
   if (const std::string note = ends_note(ended.ends, chosen.ends); !note.empty()) context.note(note);
@@ -110,10 +107,9 @@ PolygonMesh mesh_of(const LevelSet& level_set, const PolygonMesh* source, bool o
 
 PolygonMesh contour(const LevelSet& level_set, const FloatHermite& hermite, const ChosenExtractor& chosen,
                     const ExtractOptions& options, RunContext& context) {
-  // What lies on the lattice of two solids has no end of data, and no other value than its surface's.
-  if (options.isovalue != 0.0) throw hermesh::Error("the surface of a solid is at the isovalue 0");
-  if (options.ends != "closed")
-    throw hermesh::Error("the surface of a solid has no end of the data that could be open");
+  // A solid has no end of the data, and values only for the surface at 0.
+  require(options.isovalue == 0.0, "the surface of a solid is at the isovalue 0");
+  require(options.ends == "closed", "the surface of a solid has no end of the data that could be open");
   const std::optional<AdaptivityField> field = field_of(options, chosen.extractor, context);
   PolygonMesh mesh = chosen.extractor.extract({.level_set = level_set,
                                                .options = chosen.options,
@@ -122,8 +118,17 @@ PolygonMesh contour(const LevelSet& level_set, const FloatHermite& hermite, cons
                                                .hermite = &hermite,
                                                .written_in_single = options.written_in_single});
   context.check();
-  if (mesh.empty()) throw hermesh::Error("the solid has no surface, nothing was written");
+  require(!mesh.empty(), "the solid has no surface, nothing was written");
   return mesh;
+}
+
+SignRule sign_rule(const std::string& signs) {
+  if (signs == "winding-number") return SignRule::winding_number;
+  if (signs == "flood-fill") return SignRule::flood_fill;
+  if (signs == "auto") return SignRule::automatic;
+  throw hermesh::Error(
+      "signs must be winding-number, flood-fill or auto, because a bound needs an inside, not '" + signs +
+      "'");
 }
 
 constexpr const char* kOfVolumes = "dual-contouring";
@@ -155,7 +160,6 @@ Mesh extract(const Solid& solid, const ExtractOptions& options, Context& context
 Mesh remesh(const Mesh& mesh, const VoxelizeOptions& voxelizing, const ExtractOptions& extracting,
             Context& context) {
   return run(context, [&](RunContext& inner) {
-    if (voxelizing.like) throw hermesh::Error("only voxelize takes the lattice of another volume");
     const ChosenVoxelizer voxelizer = choose(voxelizing);
     const ChosenExtractor extractor = choose(extracting, kOfPolygons);
     PolygonMesh copy;
@@ -169,11 +173,9 @@ Mesh remesh(const Mesh& mesh, const VoxelizeOptions& voxelizing, const ExtractOp
 Mesh combine(Boolean operation, const Mesh& a, const Mesh& b, const VoxelizeOptions& voxelizing,
              const ExtractOptions& extracting, Context& context) {
   return run(context, [&](RunContext& inner) {
-    if (voxelizing.like) throw hermesh::Error("only voxelize takes the lattice of another volume");
     const ChosenVoxelizer voxelizer = choose(voxelizing);
-    if (voxelizer.options.is("signs", "unsigned"))
-      throw hermesh::Error(
-          "the option signs=unsigned leaves the solids without an inside that could be combined");
+    require(!voxelizer.options.is("signs", "unsigned"),
+            "the option signs=unsigned leaves the solids without an inside to combine");
     const ChosenExtractor extractor = choose(extracting, kOfPolygons);
     PolygonMesh copy_of_a, copy_of_b;
     const PolygonMesh& first = Inside::sampled(a, copy_of_a);
@@ -198,16 +200,38 @@ Mesh combine(Boolean operation, const Mesh& a, const Mesh& b, const VoxelizeOpti
     const CombinedSolid result = hermesh::combine(boolean, solid_a, solid_b, inner);
     const LostSlivers lost = lost_slivers(boolean, solid_a.hermite, solid_b.hermite);
     inner.check();
-    const std::string about_slivers =
-        lost.edges > 0 ? lost_slivers_note(lost, boolean, lattice.voxel_size) : "";
-    if (result.hermite.leaves.empty())
-      throw hermesh::Error(lost.edges > 0
-                               ? "the result is thinner than a voxel everywhere, nothing was written: " +
-                                     about_slivers
-                               : "the result is empty, nothing was written: no sample and no edge of the "
-                                 "lattice lies in it");
-    if (lost.edges > 0) inner.note(about_slivers);
+    const std::string note = lost.edges > 0 ? lost_slivers_note(lost, boolean, lattice.voxel_size) : "";
+    const bool is_empty = result.hermite.leaves.empty();
+    require(!is_empty || lost.edges == 0,
+            "the result is thinner than a voxel everywhere, nothing was written: " + note);
+    require(!is_empty,
+            "the result is empty, nothing was written: no sample and no edge of the lattice lies in it");
+    if (lost.edges > 0) inner.note(note);
     return Inside::mesh(contour(result.level_set, result.hermite, extractor, extracting, inner));
+  });
+}
+
+BoundedRemesh remesh_within(const Mesh& mesh, const BoundOptions& options, Context& context) {
+  return run(context, [&](RunContext& inner) {
+    require(options.error.has_value() != options.triangles.has_value(),
+            "give either an error or a number of triangles");
+    const BoundedRemeshOptions given{.error = options.error.value_or(0.0),
+                                     .signs = sign_rule(options.signs),
+                                     .over_holes = options.over_holes,
+                                     .most_points = options.most_points,
+                                     .smallest_voxel = options.smallest_voxel,
+                                     .written_in_single = options.written_in_single};
+    PolygonMesh copy;
+    const PolygonMesh& polygons = Inside::sampled(mesh, copy);
+    BoundedMesh made = options.triangles ? remesh_to_budget(polygons, *options.triangles, given, inner)
+                                         : bounded_remesh(polygons, given, inner);
+    if (!made.unmet.empty()) throw hermesh::Error(explanation(made));
+    for (const std::string& note : notes(made)) inner.note(note);
+    return BoundedRemesh{.mesh = Inside::mesh(std::move(made.mesh)),
+                         .error = made.error,
+                         .to_polygons = made.to_surface,
+                         .from_polygons = made.from_surface,
+                         .voxel_size = made.voxel_size};
   });
 }
 

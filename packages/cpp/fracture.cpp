@@ -1,44 +1,46 @@
 // Solids into pieces.
 #include "hermesh/fracture.h"
 
+#include <algorithm>
 #include <cmath>
 
-#include "algorithms/core/stopwatch.h"
+#include "algorithms/core/run_context.h"
 #include "algorithms/fracture/cutter_words.h"
 #include "algorithms/fracture/piece_output.h"
 #include "algorithms/hermite/samplers.h"
 #include "algorithms/thesis/thesis_fracture.h"
-#include "packages/cpp/stages.h"
+#include "packages/cpp/inside.h"
 
 namespace hermesh::v1 {
 namespace {
 
 void check(const FractureOptions& options) {
-  if (options.method != "labelled" && options.method != "thesis")
-    throw hermesh::Error("there is no method '" + options.method + "'; there are labelled and thesis");
-  if (!(options.tolerance >= 0.0) || !std::isfinite(options.tolerance))
-    throw hermesh::Error("the tolerance must be a number of at least 0");
-  if (options.rule != "printed" && options.rule != "repaired")
-    throw hermesh::Error("the rule is printed or repaired, not '" + options.rule + "'");
-  if (options.hermite != "auto" && options.hermite != "exact" && options.hermite != "level-set")
-    throw hermesh::Error("hermite is auto, exact or level-set, not '" + options.hermite + "'");
-  if (!(options.roughness >= 0.0 && options.roughness <= 1.0))
-    throw hermesh::Error("the roughness must be a number from 0 to 1");
-  if (!(options.mesh_scale > 0.0) || !std::isfinite(options.mesh_scale))
-    throw hermesh::Error("the scale of scattered meshes must be a number above 0");
-  if (!(options.min_volume >= 0.0 && options.min_volume <= 1e15))
-    throw hermesh::Error("the least volume must be a number from 0 to 1e15 voxels");
-  if (options.impact_radius && !(*options.impact_radius > 0.0 && std::isfinite(*options.impact_radius)))
-    throw hermesh::Error("the radius of the impact must be a number above 0");
-  if (options.impact_radius && !options.impact)
-    throw hermesh::Error("the radius of the impact has no effect: there is no impact");
-  if (options.impact && options.density)
-    throw hermesh::Error("the impact has no effect: the density says where places are scattered");
-  if (options.cutters.empty() == options.meshes.empty())
-    throw hermesh::Error("say what cuts by one of cutters and meshes");
+  const auto one_of = [](const std::string& value, std::initializer_list<const char*> words) {
+    return std::ranges::find(words, value) != words.end();
+  };
+  require(one_of(options.method, {"labelled", "thesis"}),
+          "there is no method '" + options.method + "'; there are labelled and thesis");
+  require(options.tolerance >= 0.0 && std::isfinite(options.tolerance),
+          "the tolerance must be a number of at least 0");
+  require(one_of(options.rule, {"printed", "repaired"}),
+          "the rule is printed or repaired, not '" + options.rule + "'");
+  require(one_of(options.hermite, {"auto", "exact", "level-set"}),
+          "hermite is auto, exact or level-set, not '" + options.hermite + "'");
+  require(options.roughness >= 0.0 && options.roughness <= 1.0, "the roughness must be a number from 0 to 1");
+  require(options.mesh_scale > 0.0 && std::isfinite(options.mesh_scale),
+          "the scale of scattered meshes must be a number above 0");
+  require(options.min_volume >= 0.0 && options.min_volume <= 1e15,
+          "the smallest volume must be a number from 0 to 1e15 voxels");
+  const double radius = options.impact_radius.value_or(1.0);
+  require(radius > 0.0 && std::isfinite(radius), "the radius of the impact must be a number above 0");
+  require(!options.impact_radius || options.impact,
+          "the radius of the impact has no effect: there is no impact");
+  require(!options.impact || !options.density,
+          "the impact has no effect: the density determines the scattered positions");
+  require(options.cutters.empty() != options.meshes.empty(), "give exactly one of cutters and meshes");
 }
 
-/// The cutters of the options. `copies` keeps polygons that the specification points to.
+/// Returns the cutters of the options. `copies` holds polygons that the specification points to.
 CutterSpec spec_of(const FractureOptions& options, std::vector<PolygonMesh>& copies) {
   if (options.meshes.empty()) return parse_cutters(options.cutters);
   CutterSpec spec;
@@ -57,11 +59,11 @@ std::array<double, 9> by_rows(const Eigen::Matrix3d& matrix) {
   return rows;
 }
 
-/// `polygons`: those that were sampled; null where the object is a volume.
+/// Breaks an object with these Hermite data; `polygons` are those that were sampled, null for a volume.
 Fracture broken(const FloatHermite& hermite, const PolygonMesh* polygons, const FractureOptions& options,
                 RunContext& context) {
-  if (hermite.leaves.empty())
-    throw hermesh::Error("the object has no inside at this size of voxel, so there is nothing to break");
+  require(!hermite.leaves.empty(),
+          "the object has no inside at this voxel size, so there is nothing to break");
   std::vector<PolygonMesh> copies;
   CutterChoices choices;
   choices.seed = options.seed;
@@ -114,7 +116,7 @@ Fracture broken(const FloatHermite& hermite, const PolygonMesh* polygons, const 
         context);
   }
   result.seconds = watch.seconds();
-  if (result.pieces.empty()) throw hermesh::Error("no piece has a surface, nothing was written");
+  require(!result.pieces.empty(), "no piece has a surface, nothing was written");
   return result;
 }
 
@@ -124,7 +126,6 @@ Fracture fracture(const Mesh& mesh, const VoxelizeOptions& voxelizing, const Fra
                   Context& context) {
   return run(context, [&](RunContext& inner) {
     check(options);
-    if (voxelizing.like) throw hermesh::Error("only voxelize takes the lattice of another volume");
     const ChosenVoxelizer voxelizer = choose(voxelizing);
     PolygonMesh copy;
     const PolygonMesh& polygons = Inside::sampled(mesh, copy);
@@ -140,7 +141,7 @@ Fracture fracture(const Mesh& mesh, const VoxelizeOptions& voxelizing, const Fra
 Fracture fracture(const Volume& level_set, const FractureOptions& options, Context& context) {
   return run(context, [&](RunContext& inner) {
     check(options);
-    if (options.hermite == "exact") throw hermesh::Error("hermite=exact needs polygons, not a volume");
+    require(options.hermite != "exact", "hermite=exact needs polygons, not a volume");
     const LevelSet inside = Inside::level_set(level_set);
     return broken(sample_level_set(inside, 0.0, inner), nullptr, options, inner);
   });

@@ -1,11 +1,11 @@
 // Hermite data: solids on a lattice, and their Booleans.
 #include "algorithms/hermite/solids.h"
-#include "packages/cpp/solid_data.h"
+#include "packages/cpp/inside.h"
 
 namespace hermesh::v1 {
 
 const Solid::Data& Inside::data(const Solid& solid) {
-  if (!solid.data_) throw hermesh::Error("the solid holds nothing");
+  require(solid.data_ != nullptr, "the solid is empty");
   return *solid.data_;
 }
 

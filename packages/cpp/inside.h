@@ -1,8 +1,8 @@
-// What the public functions share on the inside: the way from public types to those of the rooms and back.
-// Only the sources of this folder include it.
+// Internals of the public functions: conversions between the public types and those of the algorithms, and
+// steps that several functions share. Only the sources of this directory include it.
 #pragma once
 
-// Public names must live in hermesh::v1 alone here, beside the rooms' own of the same names.
+// Public names must live only in hermesh::v1 here, next to names of the algorithms that are the same.
 #ifndef HERMESH_IMPLEMENTATION
 #error "only sources of packages/cpp, compiled with HERMESH_IMPLEMENTATION, include this header"
 #endif
@@ -18,14 +18,13 @@
 #include "algorithms/core/polygon_mesh.h"
 #include "algorithms/core/run_context.h"
 #include "algorithms/core/variant.h"
-#include "hermesh/context.h"
+#include "algorithms/hermite/boolean_rule.h"
+#include "algorithms/hermite/sparse_hermite.h"
 #include "hermesh/hermite.h"
-#include "hermesh/mesh.h"
-#include "hermesh/options.h"
-#include "hermesh/volume.h"
+#include "hermesh/voxelize.h"
 
-/// What lives in the public namespace and is not public: the shared libraries show that namespace, but for
-/// this.
+/// Marks names of the public namespace that are not public: the shared libraries export that namespace
+/// without them.
 #define HERMESH_INNER __attribute__((visibility("hidden")))
 
 namespace hermesh::v1 {
@@ -34,31 +33,37 @@ struct HERMESH_INNER Mesh::Arrays {
   PolygonMesh mesh;
 };
 
-/// Grants the sources of this folder what the public classes hold.
+struct HERMESH_INNER Solid::Data {
+  Volume level_set;
+  FloatHermite hermite;
+};
+
+/// Gives the sources of this directory access to the data of the public classes.
 struct HERMESH_INNER Inside {
   static const PolygonMesh& polygons(const Mesh& mesh) { return mesh.arrays_->mesh; }
   static Mesh mesh(PolygonMesh&& polygons) {
     return Mesh(std::make_shared<const Mesh::Arrays>(Mesh::Arrays{std::move(polygons)}));
   }
-  /// The mesh's polygons as whatever samples them takes them: quads cut along their better diagonals. A mesh
-  /// without quads is not copied; `copy` holds one that is.
+  /// Returns the polygons for sampling, with quads cut along their better diagonals. A mesh with quads is
+  /// copied to `copy`.
   static const PolygonMesh& sampled(const Mesh& mesh, PolygonMesh& copy);
 
   static const std::atomic<bool>& flag(const Context& context) { return context.cancelled_; }
 
-  /// The level set inside. @throws hermesh::Error for a volume of nothing, or not of floats.
+  /// Returns the level set of a volume. @throws Error for an empty volume, or one of other values than
+  /// floats.
   static LevelSet level_set(const Volume& volume);
-  /// A volume of a level set, by the name of its grid unless another is given.
-  static Volume volume(const LevelSet& level_set, const std::string& name = {});
+  /// Returns a volume of a level set, under the name of its grid.
+  static Volume volume(const LevelSet& level_set);
 
-  static const Volume::Grid& grid(const Volume& volume);
+  static const Volume::Grid& grid(const Volume& volume);  ///< @throws Error for an empty volume.
   static Volume volume_of(Volume::Grid&& grid);
   static const Solid::Data& data(const Solid& solid);
   static Solid solid(Solid::Data&& data);
 };
 
-/// Runs work(RunContext&) for a public function: with the caller's progress and cancellation, gives the
-/// caller the notes and times also where the work ends early, and turns the rooms' exceptions into the public
+/// Runs work(RunContext&) for a public function, with the caller's progress and cancellation. Passes notes
+/// and times to the caller even if the work fails, and rethrows the exceptions of the algorithms as public
 /// ones.
 template <class Work>
 auto run(Context& context, Work&& work) {
@@ -67,8 +72,8 @@ auto run(Context& context, Work&& work) {
   std::exception_ptr of_callback;
   if (context.on_progress)
     inner.on_progress = [&](std::string_view stage, double fraction) {
-      // A stage reports from its destructor, too, out of which nothing may be thrown: the work is asked to
-      // stop, and the exception kept until it has.
+      // A stage reports from its destructor, too, which must not throw: the exception is stored until the
+      // cancelled work has ended.
       if (of_callback) return;
       try {
         context.on_progress(stage, fraction);
@@ -89,8 +94,7 @@ auto run(Context& context, Work&& work) {
       move_to(to.figures, from.figures);
     }
   };
-  // What the callback threw comes first, since the work ended because of it; the request to stop was ours
-  // then.
+  // An exception of the callback takes precedence, because it ended the work; the cancellation was ours then.
   const auto rethrow = [&] {
     if (!of_callback) return;
     context.reset();
@@ -114,22 +118,53 @@ auto run(Context& context, Work&& work) {
   } catch (const Error&) {
     throw;
   } catch (const std::exception& error) {
-    // Whatever a library throws while the caller is waiting for the end, it ends because the caller said so.
+    // After a cancellation any exception of a library ends the work on the caller's request.
     rethrow();
     if (context.cancelled()) throw Cancelled();
     throw Error(error.what());
   }
 }
 
-/// Runs work() for a public function without a context. @throws Error in place of whatever the work throws.
+/// Runs work() for a public function without a context. @throws Error for every exception of the work.
 template <class Work>
 auto run(Work&& work) {
   Context context;
   return run(context, [&](RunContext&) { return work(); });
 }
 
-/// A method of a table as the public functions list it.
+/// @throws hermesh::Error with the message unless `holds`.
+HERMESH_INNER inline void require(bool holds, const std::string& message) {
+  if (!holds) throw hermesh::Error(message);
+}
+
+static_assert(int(Boolean::union_of) == int(hermesh::Boolean::unite) &&
+              int(Boolean::intersection) == int(hermesh::Boolean::intersect) &&
+              int(Boolean::difference) == int(hermesh::Boolean::subtract));
+HERMESH_INNER inline hermesh::Boolean inner_boolean(Boolean operation) {
+  return static_cast<hermesh::Boolean>(operation);
+}
+
+/// Returns the public description of a method.
 HERMESH_INNER MethodInfo method_info(const std::string& name, const std::string& summary,
                                      const std::vector<OptionSpec>& options);
+
+/// A voxelizer with its checked options.
+struct HERMESH_INNER ChosenVoxelizer {
+  const Voxelizer& voxelizer;
+  hermesh::Options options;
+};
+/// @throws hermesh::Error for an unknown name, option or value.
+HERMESH_INNER ChosenVoxelizer choose(const VoxelizeOptions& options);
+
+/// Returns the edge length of a voxel in world units. @throws hermesh::Error unless exactly one of
+/// resolution, voxel size and lattice is given, within its range, and for a resolution of a mesh without
+/// extent.
+HERMESH_INNER double voxel_size_of(const PolygonMesh& mesh, const VoxelizeOptions& options);
+
+/// Voxelizes polygons after checking that they fit in memory, and notes lost surface. @throws hermesh::Error
+/// if `options` name the lattice of another volume, or as the voxelizer; hermesh::Cancelled
+HERMESH_INNER LevelSet level_set_of(const PolygonMesh& mesh, double voxel_size,
+                                    const VoxelizeOptions& options, const ChosenVoxelizer& chosen,
+                                    RunContext& context);
 
 }  // namespace hermesh::v1

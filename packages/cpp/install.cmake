@@ -1,4 +1,4 @@
-# What `cmake --install` installs: libraries, public headers, the files by which find_package(hermesh) finds them, the program.
+# Installs libraries, public headers, the files for find_package(hermesh), and the program.
 # Components: program, runtime and validation (shared libraries), development.
 include(GNUInstallDirs)
 include(CMakePackageConfigHelpers)
@@ -23,7 +23,7 @@ if(BUILD_SHARED_LIBS)
       LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR} COMPONENT validation NAMELINK_COMPONENT development)
   endif()
 else()
-  # Static libraries do not hold what they need; the package file finds it on the machine of the program that links them.
+  # Static libraries do not contain their dependencies; the package file finds these on the machine of the program that links them.
   target_link_libraries(hermesh_hermite INTERFACE $<INSTALL_INTERFACE:hermesh::needs>)
   if(HERMESH_BUILD_VALIDATION)
     target_link_libraries(hermesh_validation INTERFACE $<INSTALL_INTERFACE:hermesh::validation_needs>)

@@ -46,9 +46,9 @@ namespace {
 
 template <std::size_t N, class Polygons>
 void take(std::span<const std::uint32_t> corners, std::size_t points, const char* what, Polygons& polygons) {
-  if (corners.size() % N != 0)
-    throw hermesh::Error("the array of " + std::string(what) + "s holds " + std::to_string(corners.size()) +
-                         " numbers, which is no multiple of " + std::to_string(N));
+  require(corners.size() % N == 0, "the array of " + std::string(what) + "s holds " +
+                                       std::to_string(corners.size()) + " numbers, which is no multiple of " +
+                                       std::to_string(N));
   polygons.resize(corners.size() / N);
   static_assert(sizeof(polygons[0]) == N * sizeof(std::uint32_t));
   if (!corners.empty()) std::memcpy(polygons.data(), corners.data(), corners.size_bytes());
@@ -65,7 +65,7 @@ Eigen::Vector3d point_of(std::span<const Number> points, std::size_t i) {
   return {double(points[3 * i]), double(points[3 * i + 1]), double(points[3 * i + 2])};
 }
 
-/// Takes points over about the origin that a reader of files would choose for them.
+/// Copies points relative to the origin that a reader of files would choose for them.
 template <class Number>
 void take_points(std::span<const Number> points, PolygonMesh& mesh) {
   Bounds box;
@@ -89,29 +89,21 @@ void take_points(std::span<const Number> points, PolygonMesh& mesh) {
 }
 
 std::size_t elements_of(AttributeDomain domain, const PolygonMesh& mesh) {
-  switch (domain) {
-    case AttributeDomain::point:
-      return mesh.points.size();
-    case AttributeDomain::corner:
-      return 3 * mesh.triangles.size() + 4 * mesh.quads.size();
-    case AttributeDomain::polygon:
-      break;
-  }
+  if (domain == AttributeDomain::point) return mesh.points.size();
+  if (domain == AttributeDomain::corner) return 3 * mesh.triangles.size() + 4 * mesh.quads.size();
   return mesh.triangles.size() + mesh.quads.size();
 }
 
 MeshAttribute attribute_of(const Attribute& given, const PolygonMesh& mesh) {
   const std::string what = "the attribute '" + given.name + "'";
-  if (given.name.empty()) throw hermesh::Error("an attribute has no name");
-  if (given.components < 1 || given.components > 4 || (!given.integers.empty() && given.components != 1))
-    throw hermesh::Error(what + " must have 1 to 4 components, and whole numbers 1");
-  if (!given.floats.empty() && !given.integers.empty())
-    throw hermesh::Error(what + " has values of both kinds");
+  require(!given.name.empty(), "an attribute has no name");
+  require(given.components >= 1 && given.components <= 4 && (given.integers.empty() || given.components == 1),
+          what + " must have 1 to 4 components, and whole numbers 1");
+  require(given.floats.empty() || given.integers.empty(), what + " has values of both kinds");
   const std::size_t expected = elements_of(given.domain, mesh) * std::size_t(given.components);
   const std::size_t values = given.floats.size() + given.integers.size();
-  if (values != expected)
-    throw hermesh::Error(what + " has " + std::to_string(values) + " values, but the mesh needs " +
-                         std::to_string(expected));
+  require(values == expected, what + " has " + std::to_string(values) + " values, but the mesh needs " +
+                                  std::to_string(expected));
   MeshAttribute attribute;
   attribute.name = given.name;
   attribute.domain = static_cast<hermesh::AttributeDomain>(given.domain);
@@ -126,8 +118,8 @@ MeshAttribute attribute_of(const Attribute& given, const PolygonMesh& mesh) {
 
 void take_attributes(std::span<const Attribute> attributes, PolygonMesh& mesh) {
   for (const Attribute& given : attributes) {
-    if (std::ranges::any_of(mesh.attributes, [&](const MeshAttribute& a) { return a.name == given.name; }))
-      throw hermesh::Error("there are two attributes of the name '" + given.name + "'");
+    require(std::ranges::find(mesh.attributes, given.name, &MeshAttribute::name) == mesh.attributes.end(),
+            "there are two attributes of the name '" + given.name + "'");
     mesh.attributes.push_back(attribute_of(given, mesh));
   }
 }
@@ -135,9 +127,8 @@ void take_attributes(std::span<const Attribute> attributes, PolygonMesh& mesh) {
 template <class Number>
 PolygonMesh polygons_of(std::span<const Number> points, std::span<const std::uint32_t> triangles,
                         std::span<const std::uint32_t> quads, std::span<const Attribute> attributes) {
-  if (points.size() % 3 != 0)
-    throw hermesh::Error("the array of points holds " + std::to_string(points.size()) +
-                         " numbers, which is no multiple of 3");
+  require(points.size() % 3 == 0, "the array of points holds " + std::to_string(points.size()) +
+                                      " numbers, which is no multiple of 3");
   PolygonMesh mesh;
   take<3>(triangles, points.size() / 3, "triangle", mesh.triangles);
   take<4>(quads, points.size() / 3, "quad", mesh.quads);
@@ -237,8 +228,7 @@ Mesh read_mesh(const std::filesystem::path& path, Context& context, bool attribu
 
 void write_mesh(const std::filesystem::path& path, const Mesh& mesh, Context& context) {
   run(context, [&](RunContext& inner) {
-    if (mesh.empty())
-      throw hermesh::Error("'" + path.string() + "': no mesh file holds a mesh without polygons");
+    require(!mesh.empty(), "'" + path.string() + "': a mesh file cannot hold a mesh without polygons");
     hermesh::write_mesh(path, Inside::polygons(mesh), inner);
     return true;
   });

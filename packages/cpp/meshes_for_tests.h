@@ -1,4 +1,4 @@
-// What the tests of the public functions begin with, and how they catch sentences.
+// Meshes for the tests of the public functions, and how the tests catch messages.
 #pragma once
 
 #include <array>

@@ -12,7 +12,7 @@
 #include "hermesh/validate.h"
 #include "packages/cpp/meshes_for_tests.h"
 
-namespace {
+namespace same_bytes_test {
 
 using hermesh::Boolean;
 using hermesh::Context;
@@ -23,11 +23,7 @@ using namespace hermesh_tests;
 
 class AsTheProgram : public hermesh::cli::ProgramTest {
  protected:
-  /// Runs the program, which must succeed.
-  void program(const std::vector<std::string>& arguments) {
-    const hermesh::cli::Outcome outcome = run(arguments);
-    ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
-  }
+  void program(const hermesh::cli::Words& arguments) { run_to(0, arguments); }
   void expect_same(const std::string& a, const std::string& b) {
     const std::string first = read(a);
     ASSERT_FALSE(first.empty());
@@ -48,8 +44,7 @@ TEST_F(AsTheProgram, Remeshes) {
       expect_same("program.ply", "library.ply");
     }
   }
-  program({"remesh", "in.ply", "program.ply", "--voxel-size", "0.03", "-o", "tolerance=0.3", "--signs",
-           "winding-number"});
+  program("remesh in.ply program.ply --voxel-size 0.03 -o tolerance=0.3 --signs winding-number");
   hermesh::ThreadLimit one(1);
   const Mesh made = hermesh::remesh(cube(1.0), {.voxel_size = 0.03, .options = {{"signs", "winding-number"}}},
                                     {.options = {{"tolerance", "0.3"}}}, context_);
@@ -59,7 +54,7 @@ TEST_F(AsTheProgram, Remeshes) {
 
 TEST_F(AsTheProgram, RemeshesWithinAnError) {
   hermesh::write_mesh(path("in.ply"), torus(), context_);
-  program({"remesh", "in.ply", "program.ply", "--error", "0.03"});
+  program("remesh in.ply program.ply --error 0.03");
   const hermesh::BoundedRemesh made = hermesh::remesh_within(torus(), {.error = 0.03}, context_);
   hermesh::write_mesh(path("library.ply"), made.mesh, context_);
   expect_same("program.ply", "library.ply");
@@ -74,11 +69,11 @@ TEST_F(AsTheProgram, RemeshesWithinAnError) {
 
 TEST_F(AsTheProgram, VoxelizesAndExtracts) {
   hermesh::write_mesh(path("in.ply"), torus(), context_);
-  program({"voxelize", "in.ply", "program.vdb", "--resolution", "40"});
+  program("voxelize in.ply program.vdb --resolution 40");
   const Volume volume = hermesh::voxelize(torus(), at_resolution(40), context_);
   hermesh::write_vdb(path("library.vdb"), volume, context_);
   expect_same("program.vdb", "library.vdb");
-  program({"voxelize", "in.ply", "program.vdb", "--resolution", "40", "--grids", "sdf,fog,closest-point"});
+  program("voxelize in.ply program.vdb --resolution 40 --grids sdf,fog,closest-point");
   const std::vector<Volume> volumes =
       hermesh::voxelize_grids(torus(), "sdf,fog,closest-point", at_resolution(40), context_);
   hermesh::write_vdb(path("library.vdb"), volumes, context_);
@@ -86,8 +81,7 @@ TEST_F(AsTheProgram, VoxelizesAndExtracts) {
   EXPECT_EQ(hermesh::grid_names(path("library.vdb")),
             (std::vector<std::string>{"closest-point", "fog", "sdf"}));
 
-  program({"extract", "program.vdb", "program.ply", "--grid", "fog", "--isovalue", "0.5", "--extractor",
-           "marching-cubes"});
+  program("extract program.vdb program.ply --grid fog --isovalue 0.5 --extractor marching-cubes");
   const Volume fog = hermesh::read_vdb(path("library.vdb"), context_, "fog");
   const Mesh mesh = hermesh::extract(fog, {.extractor = "marching-cubes", .isovalue = 0.5}, context_);
   hermesh::write_mesh(path("library.ply"), mesh, context_);
@@ -98,7 +92,7 @@ TEST_F(AsTheProgram, Combines) {
   const Mesh a = torus(), b = cube(1.0, {0.2, -0.5, -0.5});
   hermesh::write_mesh(path("a.ply"), a, context_);
   hermesh::write_mesh(path("b.ply"), b, context_);
-  program({"combine", "difference", "a.ply", "b.ply", "program.ply", "--resolution", "40"});
+  program("combine difference a.ply b.ply program.ply --resolution 40");
   const Mesh mesh = hermesh::combine(Boolean::difference, a, b, at_resolution(40), {}, context_);
   hermesh::write_mesh(path("library.ply"), mesh, context_);
   expect_same("program.ply", "library.ply");
@@ -106,8 +100,7 @@ TEST_F(AsTheProgram, Combines) {
 
 TEST_F(AsTheProgram, Breaks) {
   hermesh::write_mesh(path("in.ply"), torus(), context_);
-  program({"fracture", "in.ply", "pieces", "--resolution", "40", "--cutters", "chunks:5", "--seed", "3",
-           "--no-picture"});
+  program("fracture in.ply pieces --resolution 40 --cutters chunks:5 --seed 3 --no-picture");
   hermesh::FractureOptions options;
   options.cutters = "chunks:5";
   options.seed = 3;
@@ -125,8 +118,7 @@ TEST_F(AsTheProgram, Breaks) {
 
 TEST_F(AsTheProgram, Judges) {
   hermesh::write_mesh(path("in.ply"), torus(), context_);
-  program({"validate", "in.ply", "--json"});
-  const std::string of_program = run({"validate", "in.ply", "--json"}).out;
+  const std::string of_program = run_to(0, "validate in.ply --json").out;
   const std::string json = hermesh::validate(torus(), {}, context_).json;
   // The program adds the file and the requirements; every line of ours is in its text.
   std::istringstream lines(json);
@@ -142,7 +134,7 @@ TEST_F(AsTheProgram, ImportsRawSamples) {
   std::string bytes;
   for (int i = 0; i < 4 * 5 * 6; ++i) bytes.push_back(char(i));
   write("in.raw", bytes);
-  program({"import", "in.raw", "program.vdb", "--dims", "4,5,6", "--type", "uint8", "--spacing", "1,1,2"});
+  program("import in.raw program.vdb --dims 4,5,6 --type uint8 --spacing 1,1,2");
   const Volume volume = hermesh::import_volume(
       path("in.raw"), {.raw = hermesh::RawSamples{.dims = {4, 5, 6}, .type = "uint8", .spacing = {1, 1, 2}}},
       context_);
@@ -153,4 +145,4 @@ TEST_F(AsTheProgram, ImportsRawSamples) {
   EXPECT_EQ(volume.dims(), (std::array<int, 3>{4, 5, 6}));
 }
 
-}  // namespace
+}  // namespace same_bytes_test

@@ -1,11 +1,11 @@
-// Judges of meshes.
+// Validation of meshes.
 #include "hermesh/validate.h"
 
 #include <cmath>
 
 #include "algorithms/io/mesh_file.h"
 #include "packages/cpp/inside.h"
-#include "validation/fracture_ledger.h"
+#include "validation/fracture_report.h"
 #include "validation/mesh_report.h"
 #include "validation/report_json.h"
 
@@ -78,20 +78,19 @@ std::optional<MeshFile> file_of(const Mesh* mesh) {
 
 Report validate(const Mesh& mesh, const ValidateOptions& options, Context& context) {
   return run(context, [&](RunContext& inner) {
-    if (options.certify && !options.reference)
-      throw hermesh::Error("certify bounds the distance to a reference: give one");
-    if (!(options.voxel_size >= 0.0 && std::isfinite(options.voxel_size)))
-      throw hermesh::Error("the voxel size must be a number of at least 0");
-    if (options.voxel_size > 0.0 && !options.reference)
-      throw hermesh::Error("the voxel size says what explains a distance to a reference: give one");
-    if (options.samples < 1 || options.samples > 1'000'000'000)
-      throw hermesh::Error("the number of samples must be from 1 to 1000000000");
-    if (!(options.dihedral >= 0.0 && options.dihedral <= 180.0))
-      throw hermesh::Error("the dihedral angle must be from 0 to 180 degrees");
+    require(!options.certify || options.reference, "certify bounds the distance to a reference: give one");
+    require(options.voxel_size >= 0.0 && std::isfinite(options.voxel_size),
+            "the voxel size must be a number of at least 0");
+    require(options.voxel_size == 0.0 || options.reference,
+            "the voxel size explains distances to a reference: give one");
+    require(options.samples >= 1 && options.samples <= 1'000'000'000,
+            "the number of samples must be from 1 to 1000000000");
+    require(options.dihedral >= 0.0 && options.dihedral <= 180.0,
+            "the dihedral angle must be from 0 to 180 degrees");
     const MeshFile judged = to_mesh_file(Inside::polygons(mesh));
     const std::optional<MeshFile> reference = file_of(options.reference),
                                   features = file_of(options.features);
-    validation::JudgeOptions chosen;
+    validation::CheckOptions chosen;
     chosen.self_intersections = options.self_intersections;
     chosen.libraries = options.libraries;
     chosen.reference = reference ? &*reference : nullptr;
@@ -100,7 +99,7 @@ Report validate(const Mesh& mesh, const ValidateOptions& options, Context& conte
     chosen.certify = options.certify;
     chosen.dihedral_degrees = options.dihedral;
     chosen.voxel_size = options.voxel_size;
-    return report_of(validation::judge(judged, chosen, inner));
+    return report_of(validation::check_mesh(judged, chosen, inner));
   });
 }
 
@@ -108,7 +107,7 @@ FractureReport validate_fracture(const std::vector<Mesh>& pieces, Context& conte
   return run(context, [&](RunContext& inner) {
     std::vector<MeshFile> files;
     for (const Mesh& piece : pieces) files.push_back(to_mesh_file(Inside::polygons(piece)));
-    const validation::FractureLedger ledger = validation::judge_fracture(files, inner);
+    const validation::FractureReport ledger = validation::check_fracture(files, inner);
     return FractureReport{.consistent = ledger.is_consistent(),
                           .pieces = ledger.pieces,
                           .triangles = ledger.triangles,

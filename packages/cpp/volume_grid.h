@@ -1,4 +1,4 @@
-// What a public volume holds. Heavy (OpenVDB): include it after inside.h from .cpp files that need it.
+// Data of a public volume. Heavy (OpenVDB): include it after inside.h from .cpp files that need it.
 #pragma once
 
 #include "algorithms/core/level_set_grid.h"

@@ -1,4 +1,4 @@
-// numpy's arrays over the C++ ones and back. Only bindings of this folder include it.
+// Conversions between arrays of numpy and C++. Only bindings of this directory include it.
 #pragma once
 
 #include <pybind11/numpy.h>
@@ -17,8 +17,8 @@ namespace hermesh::python {
 
 namespace py = pybind11;
 
-/// An array over memory that `owner`, which is kept by it, holds alive; nobody may write into it, since
-/// copies of a mesh share their arrays.
+/// Returns a read-only array over memory of `owner`, which it keeps alive. Copies of a mesh share their
+/// arrays.
 template <class T, class Owner>
 py::array view(std::span<const T> values, std::vector<py::ssize_t> shape, Owner owner) {
   const py::capsule keeper(new Owner(std::move(owner)), [](void* p) { delete static_cast<Owner*>(p); });
@@ -27,7 +27,7 @@ py::array view(std::span<const T> values, std::vector<py::ssize_t> shape, Owner 
   return array;
 }
 
-/// An array that owns a vector, which is moved and not copied.
+/// Returns an array that owns a moved vector.
 template <class T>
 py::array owning(std::vector<T>&& values, std::vector<py::ssize_t> shape) {
   auto* held = new std::vector<T>(std::move(values));
@@ -35,9 +35,9 @@ py::array owning(std::vector<T>&& values, std::vector<py::ssize_t> shape) {
   return py::array_t<T>(std::move(shape), held->data(), keeper);
 }
 
-/// What was given as an array of numbers side by side, of its own type where `kinds` (numpy's letters, such
-/// as "f4 f8") names it and of the type `fallback` otherwise; not copied unless one of both asks for it.
-/// @throws Error where it is no array of numbers.
+/// Returns a contiguous array of numbers, of its own type if `kinds` (numpy's letters, such as "f4 f8")
+/// contains it, else of the type `fallback`; copied only if necessary. @throws Error if it is not an array of
+/// numbers.
 inline py::array contiguous(const py::handle& given, const std::string& kinds, const char* fallback,
                             const std::string& what) {
   const py::module_ numpy = py::module_::import("numpy");
@@ -51,7 +51,7 @@ inline py::array contiguous(const py::handle& given, const std::string& kinds, c
   return numpy.attr("ascontiguousarray")(array, type);
 }
 
-/// @throws Error unless the array is of rows of so many numbers; one of nothing at all has no rows.
+/// @throws Error unless the rows of the array have `columns` numbers; an empty array has no rows.
 inline void check_rows(const py::array& array, py::ssize_t columns, const std::string& what) {
   if (array.size() == 0 && array.ndim() <= 2) return;
   if (array.ndim() == 2 && array.shape(1) == columns) return;

@@ -1,5 +1,5 @@
-// The extension module hermesh._core: the public C++ functions but the judges, which are in another module
-// for the sake of their licence. What is pleasant to call is made of it in hermesh/__init__.py.
+// The extension module hermesh._core: the public C++ functions except validation, which is in another module
+// because of its licence. hermesh/__init__.py wraps both.
 #include <pybind11/stl.h>
 #include <pybind11/stl/filesystem.h>
 
@@ -15,8 +15,8 @@ namespace {
 
 // ---- Meshes.
 
-/// Three or four numbers of points a polygon, as numpy has them. Arrays of 32 bits are taken as they are:
-/// numbers below 0 are looked for first, for as unsigned ones they would be others.
+/// Returns the indices of three or four points per polygon from an array. Arrays of 32 bits are not
+/// converted, after a check for negative indices.
 py::array polygon_array(const py::object& given, py::ssize_t corners, const std::string& what) {
   if (given.is_none()) return py::array_t<std::uint32_t>(0);
   const py::module_ numpy = py::module_::import("numpy");
@@ -40,65 +40,68 @@ py::array polygon_array(const py::object& given, py::ssize_t corners, const std:
   return array.attr("view")("u4");
 }
 
-/// Attributes of one domain from a dict of arrays; `arrays` keeps them alive.
-void add_attributes(const py::dict& given, AttributeDomain domain,
-                    const std::map<std::string, std::vector<std::string>>& labels,
-                    std::vector<Attribute>& attributes, std::vector<py::array>& arrays) {
-  for (const auto& [key, value] : given) {
-    Attribute attribute;
-    attribute.name = py::str(key).cast<std::string>();
-    attribute.domain = domain;
-    const py::array numbers = py::module_::import("numpy").attr("asarray")(value);
-    const bool whole = numbers.dtype().kind() == 'i' || numbers.dtype().kind() == 'u';
-    const bool one = numbers.ndim() == 1 || (numbers.ndim() == 2 && numbers.shape(1) == 1);
-    const std::string what = "the attribute '" + attribute.name + "'";
-    if (numbers.ndim() != 1 && numbers.ndim() != 2)
-      throw Error("the array of " + what + " must have the shape (n,) or (n, components)");
-    // Whole numbers of several components, such as colours of 8 bits, are numbers like others.
-    const bool as_integers = whole && one;
-    const py::array array = contiguous(value, as_integers ? "i4" : "f4", as_integers ? "i4" : "f4", what);
-    attribute.components = numbers.ndim() == 1 ? 1 : int(numbers.shape(1));
-    if (as_integers)
-      attribute.integers = span_of<std::int32_t>(array);
-    else
-      attribute.floats = span_of<float>(array);
-    if (const auto names = labels.find(attribute.name); names != labels.end())
-      attribute.labels = names->second;
-    arrays.push_back(array);
-    attributes.push_back(std::move(attribute));
+/// Attributes from dicts of arrays, which are kept alive.
+struct GivenAttributes {
+  std::vector<Attribute> attributes;
+  std::vector<py::array> arrays;
+
+  GivenAttributes(const py::dict& of_points, const py::dict& of_corners, const py::dict& of_polygons,
+                  const std::map<std::string, std::vector<std::string>>& labels) {
+    add(of_points, AttributeDomain::point);
+    add(of_corners, AttributeDomain::corner);
+    add(of_polygons, AttributeDomain::polygon);
+    for (Attribute& attribute : attributes)
+      if (const auto names = labels.find(attribute.name); names != labels.end())
+        attribute.labels = names->second;
   }
-}
+
+  void add(const py::dict& given, AttributeDomain domain) {
+    for (const auto& [key, value] : given) {
+      Attribute attribute;
+      attribute.name = py::str(key).cast<std::string>();
+      attribute.domain = domain;
+      const py::array numbers = py::module_::import("numpy").attr("asarray")(value);
+      const bool whole = numbers.dtype().kind() == 'i' || numbers.dtype().kind() == 'u';
+      const bool one = numbers.ndim() == 1 || (numbers.ndim() == 2 && numbers.shape(1) == 1);
+      const std::string what = "the attribute '" + attribute.name + "'";
+      if (numbers.ndim() != 1 && numbers.ndim() != 2)
+        throw Error("the array of " + what + " must have the shape (n,) or (n, components)");
+      // Integers of several components, such as 8-bit colours, become floats.
+      const char* type = whole && one ? "i4" : "f4";
+      const py::array array = contiguous(value, type, type, what);
+      attribute.components = numbers.ndim() == 1 ? 1 : int(numbers.shape(1));
+      if (whole && one)
+        attribute.integers = span_of<std::int32_t>(array);
+      else
+        attribute.floats = span_of<float>(array);
+      arrays.push_back(array);
+      attributes.push_back(std::move(attribute));
+    }
+  }
+};
 
 Mesh make_mesh(const py::object& points, const py::object& triangles, const py::object& quads,
                const py::dict& of_points, const py::dict& of_corners, const py::dict& of_polygons,
                const std::map<std::string, std::vector<std::string>>& labels) {
-  const py::array places = contiguous(points, "f4 f8", "f8", "points");
-  check_rows(places, 3, "points");
+  const py::array positions = contiguous(points, "f4 f8", "f8", "points");
+  check_rows(positions, 3, "points");
   const py::array three = polygon_array(triangles, 3, "triangle");
   const py::array four = polygon_array(quads, 4, "quad");
-  std::vector<Attribute> attributes;
-  std::vector<py::array> arrays;
-  add_attributes(of_points, AttributeDomain::point, labels, attributes, arrays);
-  add_attributes(of_corners, AttributeDomain::corner, labels, attributes, arrays);
-  add_attributes(of_polygons, AttributeDomain::polygon, labels, attributes, arrays);
+  const GivenAttributes given(of_points, of_corners, of_polygons, labels);
   const auto t = span_of<std::uint32_t>(three), q = span_of<std::uint32_t>(four);
-  const bool single = places.itemsize() == 4;
-  const auto f = single ? span_of<float>(places) : std::span<const float>();
-  const auto d = single ? std::span<const double>() : span_of<double>(places);
+  const bool single = positions.itemsize() == 4;
+  const auto f = single ? span_of<float>(positions) : std::span<const float>();
+  const auto d = single ? std::span<const double>() : span_of<double>(positions);
   const py::gil_scoped_release others_may_run;
-  return single ? Mesh(f, t, q, attributes) : Mesh(d, t, q, attributes);
+  return single ? Mesh(f, t, q, given.attributes) : Mesh(d, t, q, given.attributes);
 }
 
 Mesh with_attributes(const Mesh& mesh, const py::dict& of_points, const py::dict& of_corners,
                      const py::dict& of_polygons,
                      const std::map<std::string, std::vector<std::string>>& labels) {
-  std::vector<Attribute> attributes;
-  std::vector<py::array> arrays;
-  add_attributes(of_points, AttributeDomain::point, labels, attributes, arrays);
-  add_attributes(of_corners, AttributeDomain::corner, labels, attributes, arrays);
-  add_attributes(of_polygons, AttributeDomain::polygon, labels, attributes, arrays);
+  const GivenAttributes given(of_points, of_corners, of_polygons, labels);
   const py::gil_scoped_release others_may_run;
-  return mesh.with_attributes(attributes);
+  return mesh.with_attributes(given.attributes);
 }
 
 py::array points_of(const Mesh& mesh) {
@@ -142,33 +145,27 @@ void bind_mesh(py::module_& m) {
   py::class_<Mesh>(
       m, "Mesh",
       "Triangles and quads over shared points, counter-clockwise seen from outside, with attributes.\n\n"
-      "Nobody changes a mesh once it is made. Its arrays are views of what it holds, not copies, and\n"
-      "read-only: take `mesh.points.copy()` to write.")
-      .def(py::init(&make_mesh), py::arg("points"), py::arg("triangles") = py::none(),
-           py::arg("quads") = py::none(), py::kw_only(), py::arg("point_attributes") = none,
-           py::arg("corner_attributes") = none, py::arg("polygon_attributes") = none,
-           py::arg("labels") = std::map<std::string, std::vector<std::string>>(),
-           "A mesh of arrays, which are copied once.\n\n"
-           "points: (n, 3) of float32 or float64, world units; float64 keeps what single precision would "
-           "lose\n"
-           "    far from the origin (see `origin`).\n"
-           "triangles, quads: (m, 3) and (k, 4) of int32 or uint32 (others are converted), from 0. How quads "
-           "from\n"
-           "    elsewhere are cut is not known: what samples polygons cuts each along its better diagonal.\n"
-           "point_attributes, corner_attributes, polygon_attributes: name to array, one row for each point, "
-           "for\n"
-           "    each polygon's corner, or for each triangle and then each quad; 1 to 4 columns of float32, "
-           "or\n"
-           "    one of whole numbers (-1 stands for none).\n"
-           "labels: name of an attribute of whole numbers to the names of its values from 0 on.\n\n"
-           "Raises Error for an index out of range, a coordinate that is not finite, and shapes that do not "
-           "fit.")
+      "A mesh is immutable. Its arrays are read-only views, not copies; use `mesh.points.copy()` to write.")
       .def(
-          "with_attributes", &with_attributes, py::kw_only(), py::arg("point_attributes") = none,
+          py::init(&make_mesh), py::arg("points"), py::arg("triangles") = py::none(),
+          py::arg("quads") = py::none(), py::kw_only(), py::arg("point_attributes") = none,
           py::arg("corner_attributes") = none, py::arg("polygon_attributes") = none,
           py::arg("labels") = std::map<std::string, std::vector<std::string>>(),
-          "A mesh of the same polygons with these attributes in place of their own, given as to Mesh(); all\n"
-          "arrays are copied. Raises Error for an attribute whose number of values does not fit.")
+          "A mesh of arrays, which are copied once.\n\n"
+          "points: (n, 3) of float32 or float64, world units; float64 preserves precision far from the\n"
+          "    origin (see `origin`).\n"
+          "triangles, quads: (m, 3) and (k, 4) of int32 or uint32 (others are converted), from 0. Functions\n"
+          "    that sample polygons split each quad along its better diagonal.\n"
+          "point_attributes, corner_attributes, polygon_attributes: name to array, one row for each point,\n"
+          "    for each polygon's corner, or for each triangle and then each quad; 1 to 4 columns of\n"
+          "    float32, or one of integers (-1 means none).\n"
+          "labels: name of an integer attribute to the names of its values from 0 on.\n\n"
+          "Raises Error for an index out of range, a coordinate that is not finite, and wrong shapes.")
+      .def("with_attributes", &with_attributes, py::kw_only(), py::arg("point_attributes") = none,
+           py::arg("corner_attributes") = none, py::arg("polygon_attributes") = none,
+           py::arg("labels") = std::map<std::string, std::vector<std::string>>(),
+           "Returns a mesh of the same polygons with these attributes, given as to Mesh(), in place of its\n"
+           "own; all arrays are copied. Raises Error for an attribute with a wrong number of values.")
       .def_property_readonly("points", &points_of,
                              "(n, 3) float32, world units relative to `origin`; a read-only view.")
       .def_property_readonly(
@@ -177,29 +174,29 @@ void bind_mesh(py::module_& m) {
             const std::array<double, 3> o = mesh.origin();
             return py::make_tuple(o[0], o[1], o[2]);
           },
-          "Where `points` have their zero, world units; (0, 0, 0) unless the mesh lies far from it.")
+          "The zero of `points`, world units; (0, 0, 0) unless the mesh lies far from it.")
       .def(
           "world_points",
           [](const Mesh& mesh) {
             return owning(mesh.world_points(), {py::ssize_t(mesh.point_count()), 3});
           },
-          "(n, 3) float64, world units, in an array of the caller's own.")
+          "(n, 3) float64, world units, in a new array.")
       .def_property_readonly(
           "triangles",
           [](const Mesh& mesh) {
             return view(mesh.triangles(), {py::ssize_t(mesh.triangle_count()), 3}, mesh);
           },
-          "(m, 3) uint32, numbers of points; a read-only view.")
+          "(m, 3) uint32, indices of points; a read-only view.")
       .def_property_readonly(
           "quads",
           [](const Mesh& mesh) {
             return view(mesh.quads(), {py::ssize_t(mesh.quad_count()), 4}, mesh);
           },
-          "(k, 4) uint32, numbers of points; a read-only view. A quad (a, b, c, d) of a mesh that hermesh "
-          "made\n"
+          "(k, 4) uint32, indices of points; a read-only view. A quad (a, b, c, d) of a mesh made by "
+          "hermesh\n"
           "means the triangles abc and acd.")
       .def("triangulated", &triangulated,
-           "(m + 2 k, 3) uint32: the triangles, then two for each quad, in an array of the caller's own.")
+           "(m + 2 k, 3) uint32: the triangles, then two for each quad, in a new array.")
       .def_property_readonly(
           "point_attributes", [](const Mesh& mesh) { return attributes_of(mesh, AttributeDomain::point); },
           "Name to a read-only view, one row for each point.")
@@ -211,7 +208,7 @@ void bind_mesh(py::module_& m) {
           [](const Mesh& mesh) { return attributes_of(mesh, AttributeDomain::polygon); },
           "Name to a read-only view, one row for each triangle, then for each quad.")
       .def_property_readonly("labels", &labels_of,
-                             "Name of an attribute of whole numbers to the names of its values from 0 on.")
+                             "Name of an integer attribute to the names of its values from 0 on.")
       .def("__repr__", [](const Mesh& mesh) {
         return "<hermesh.Mesh of " + std::to_string(mesh.point_count()) + " points, " +
                std::to_string(mesh.triangle_count()) + " triangles, " + std::to_string(mesh.quad_count()) +
@@ -277,9 +274,9 @@ py::array sampled(const Volume& volume, const py::object& places) {
 void bind_volume(py::module_& m) {
   py::class_<Volume>(
       m, "Volume",
-      "A sparse grid of values with its placement, an OpenVDB grid inside.\n\n"
-      "As a level set: signed distance in world units, negative inside, right within a narrow band\n"
-      "and plus or minus `background` beyond. Nobody changes a volume once it is made.")
+      "A sparse grid of values with its placement, which owns an OpenVDB grid; immutable.\n\n"
+      "A level set has signed distances in world units, negative inside, within a narrow band and plus or\n"
+      "minus `background` beyond.")
       .def_static(
           "from_numpy", &make_volume, py::arg("values"), py::kw_only(),
           py::arg("lower") = std::array<int, 3>{0, 0, 0}, py::arg("voxel_size") = 1.0,
@@ -289,8 +286,8 @@ void bind_volume(py::module_& m) {
           "values: (nx, ny, nz), float32 (others are converted); values[x, y, z] is the sample with the\n"
           "    index lower + (x, y, z), which lies at origin + voxel_size * index, world units, or where\n"
           "    `placement`, (3, 4) or (4, 4), maps the index.\n"
-          "level_set: True: signed distances in world units, negative inside, of which those nearer than\n"
-          "    the background are kept. False: every sample counts as known, and the volume ends at its\n"
+          "level_set: True: signed distances in world units, negative inside; those of at least the\n"
+          "    background become the background. False: every sample is active, and the volume ends at its\n"
           "    box.\n"
           "background: the value beyond the samples; None: the greatest magnitude of a level set, else\n"
           "    just below the least value.\n\n"
@@ -343,7 +340,9 @@ void bind_volume(py::module_& m) {
 // ---- Options and results.
 
 void bind_options(py::module_& m) {
-  py::class_<Watch>(m, "Watch", "What a call is watched by, and its notes, times and figures afterwards.")
+  py::class_<Watch>(
+      m, "Watch",
+      "Progress, cancellation and threads of a call, and its notes, times and figures afterwards.")
       .def(py::init([](py::object progress, py::object cancel, std::optional<int> threads) {
              return Watch{std::move(progress), std::move(cancel), threads};
            }),
@@ -360,7 +359,7 @@ void bind_options(py::module_& m) {
       .def_readwrite("interior_band", &VoxelizeOptions::interior_band)
       .def_readwrite("voxelizer", &VoxelizeOptions::voxelizer)
       .def_readwrite("options", &VoxelizeOptions::options);
-  py::class_<Frustum>(m, "Frustum", "What a camera sees: lengths in world units, the angle in degrees.")
+  py::class_<Frustum>(m, "Frustum", "The view of a camera: lengths in world units, the angle in degrees.")
       .def(py::init([](std::array<double, 3> position, std::array<double, 3> look_at,
                        std::array<double, 3> up, double angle, double aspect, double near,
                        double far) { return Frustum{position, look_at, up, angle, aspect, near, far}; }),
@@ -414,9 +413,9 @@ void bind_options(py::module_& m) {
       .def_readonly("name", &Piece::name)
       .def_readonly(
           "mesh", &Piece::mesh,
-          "World units. Of the method labelled with polygon attributes `surface` (0 original, 1 cut) and\n"
-          "`neighbour` (the number of the piece beyond, -1 none), a corner attribute `uv`, and those of\n"
-          "the mesh that was broken.")
+          "World units. The method labelled adds polygon attributes `surface` (0 original, 1 cut) and\n"
+          "`neighbour` (the number of the adjacent piece, -1 none), a corner attribute `uv`, and those of\n"
+          "the fractured mesh.")
       .def_readonly("volume", &Piece::volume, "World units.")
       .def_readonly("area", &Piece::area, "World units.")
       .def_readonly("centre_of_mass", &Piece::centre_of_mass, "World units.")
@@ -445,7 +444,7 @@ void bind_options(py::module_& m) {
       .def_readonly("minimum", &OptionInfo::minimum)
       .def_readonly("maximum", &OptionInfo::maximum)
       .def("__repr__", [](const OptionInfo& option) { return option.name + "=" + option.fallback; });
-  py::class_<MethodInfo>(m, "MethodInfo", "A method, and what an extractor's mesh is for every input.")
+  py::class_<MethodInfo>(m, "MethodInfo", "A method, and the guarantees of an extractor for every input.")
       .def_readonly("name", &MethodInfo::name)
       .def_readonly("summary", &MethodInfo::summary)
       .def_readonly("closed", &MethodInfo::closed)
@@ -467,8 +466,8 @@ Boolean boolean_of(const std::string& operation) {
 
 void bind_functions(py::module_& m) {
   m.def("version", &version);
-  m.def("extractors", &extractors, "The extractors that there are, with their options.");
-  m.def("voxelizers", &voxelizers, "The voxelizers that there are, with their options.");
+  m.def("extractors", &extractors, "Returns the available extractors, with their options.");
+  m.def("voxelizers", &voxelizers, "Returns the available voxelizers, with their options.");
   m.def("read_mesh", [](const std::filesystem::path& path, bool attributes, Watch& watch) {
     return watched(watch, [&](Context& context) { return read_mesh(path, context, attributes); });
   });
@@ -478,7 +477,7 @@ void bind_functions(py::module_& m) {
   m.def("read_vdb", [](const std::filesystem::path& path, const std::string& grid, Watch& watch) {
     return watched(watch, [&](Context& context) { return read_vdb(path, context, grid); });
   });
-  m.def("grid_names", &grid_names, py::arg("path"), "Names of the grids of a .vdb file.");
+  m.def("grid_names", &grid_names, py::arg("path"), "Returns the names of the grids of a .vdb file.");
   m.def("write_vdb", [](const std::filesystem::path& path, const std::vector<Volume>& volumes, Watch& watch) {
     watched(watch, [&](Context& context) { return write_vdb(path, volumes, context), true; });
   });
@@ -493,12 +492,10 @@ void bind_functions(py::module_& m) {
                                .spacing = spacing.value_or(std::array<double, 3>{1, 1, 1}),
                                .offset = offset.value_or(0)};
     else if (!type.empty() || spacing || offset)
-      throw Error("type, spacing and offset say how raw samples lie: give dims, too");
+      throw Error("type, spacing and offset concern raw samples: give dims, too");
     return watched(watch, [&](Context& context) { return import_volume(path, options, context); });
   });
-  m.def("voxelize", [](const Mesh& mesh, const VoxelizeOptions& options, Watch& watch) {
-    return watched(watch, [&](Context& context) { return voxelize(mesh, options, context); });
-  });
+  m.def("voxelize", watching<const Mesh&, const VoxelizeOptions&>(&voxelize));
   m.def("voxelize_grids", [](const Mesh& mesh, const std::string& grids, const VoxelizeOptions& options,
                              bool fog_exterior, Watch& watch) {
     return watched(
@@ -510,10 +507,7 @@ void bind_functions(py::module_& m) {
             return extract(volume, options, context, source ? &*source : nullptr);
           });
         });
-  m.def("remesh", [](const Mesh& mesh, const VoxelizeOptions& voxelizing, const ExtractOptions& extracting,
-                     Watch& watch) {
-    return watched(watch, [&](Context& context) { return remesh(mesh, voxelizing, extracting, context); });
-  });
+  m.def("remesh", watching<const Mesh&, const VoxelizeOptions&, const ExtractOptions&>(&remesh));
   m.def("remesh_within",
         [](const Mesh& mesh, std::optional<double> error, std::optional<std::size_t> triangles,
            const std::string& signs, bool over_holes, double smallest_voxel, double limit_points,
@@ -537,13 +531,10 @@ void bind_functions(py::module_& m) {
     return watched(watch,
                    [&](Context& context) { return combine(boolean, a, b, voxelizing, extracting, context); });
   });
-  m.def("fracture", [](const Mesh& mesh, const VoxelizeOptions& voxelizing, const FractureOptions& options,
-                       Watch& watch) {
-    return watched(watch, [&](Context& context) { return fracture(mesh, voxelizing, options, context); });
-  });
-  m.def("fracture_volume", [](const Volume& volume, const FractureOptions& options, Watch& watch) {
-    return watched(watch, [&](Context& context) { return fracture(volume, options, context); });
-  });
+  m.def("fracture", watching<const Mesh&, const VoxelizeOptions&, const FractureOptions&>(
+                        [](auto&... given) { return fracture(given...); }));
+  m.def("fracture_volume",
+        watching<const Volume&, const FractureOptions&>([](auto&... given) { return fracture(given...); }));
 }
 
 }  // namespace
@@ -552,7 +543,7 @@ void bind_functions(py::module_& m) {
 PYBIND11_MODULE(_core, m) {
   namespace py = pybind11;
   m.doc() = "Bindings of the public C++ functions; use the package hermesh.";
-  // Both translate what any extension module of this process throws, the judges' included.
+  // Both translate exceptions of all extension modules of this process, validation included.
   py::register_exception<hermesh::Error>(m, "Error", PyExc_RuntimeError).attr("__module__") = "hermesh";
   py::register_exception<hermesh::Cancelled>(m, "Cancelled", PyExc_Exception).attr("__module__") = "hermesh";
   hermesh::python::bind_mesh(m);

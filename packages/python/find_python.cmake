@@ -1,4 +1,4 @@
-# Whether the Python module is built, hermesh_python_is_built, by HERMESH_BUILD_PYTHON and by what is installed; says why not.
+# Sets hermesh_python_is_built from HERMESH_BUILD_PYTHON and the installed packages; prints the reason if it is off.
 set(hermesh_python_is_built OFF)
 if(NOT PROJECT_IS_TOP_LEVEL OR (NOT HERMESH_BUILD_PYTHON STREQUAL "AUTO" AND NOT HERMESH_BUILD_PYTHON))
   return()

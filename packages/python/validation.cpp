@@ -1,5 +1,5 @@
-// The extension module hermesh._validation: the judges. Their library is under GPL-3, and so is this module;
-// it is loaded when they are first called.
+// The extension module hermesh._validation. Its library is under GPL-3, and so is this module; it is loaded
+// at the first use.
 #include <pybind11/stl.h>
 
 #include "hermesh/validate.h"
@@ -14,7 +14,7 @@ void bind_report(py::module_& m) {
       .def_readonly("max", &SurfaceDistances::max)
       .def_readonly("mean", &SurfaceDistances::mean)
       .def_readonly("rms", &SurfaceDistances::rms)
-      .def_readonly("worst", &SurfaceDistances::worst, "The place of the greatest.");
+      .def_readonly("worst", &SurfaceDistances::worst, "The position of the greatest.");
   py::class_<HausdorffBracket>(m, "HausdorffBracket",
                                "A certified bracket of a one-sided Hausdorff distance, world units.")
       .def_readonly("lower", &HausdorffBracket::lower)
@@ -22,13 +22,13 @@ void bind_report(py::module_& m) {
   py::class_<DefectPlace>(m, "DefectPlace")
       .def_readonly("point", &DefectPlace::point, "World units.")
       .def_readonly("polygons", &DefectPlace::polygons,
-                    "The polygons, triangles first, then quads; the second is -1 where there is one.");
+                    "The polygons, triangles first, then quads; the second is -1 if there is only one.");
   py::class_<Defect>(m, "Defect")
       .def_readonly("name", &Defect::name, "boundary_edges, ..., self_intersecting_pairs")
       .def_readonly("count", &Defect::count)
       .def_readonly("places", &Defect::places, "Those of the first ten.")
       .def("__repr__", [](const Defect& defect) { return std::to_string(defect.count) + " " + defect.name; });
-  py::class_<Report>(m, "Report", "What the judges say of a mesh. str() of it is the verdict in words.")
+  py::class_<Report>(m, "Report", "The validation report of a mesh. str() of it is the verdict.")
       .def_readonly("points", &Report::points)
       .def_readonly("triangles", &Report::triangles)
       .def_readonly("quads", &Report::quads)
@@ -42,7 +42,7 @@ void bind_report(py::module_& m) {
       .def_readonly("components", &Report::components)
       .def_readonly("euler_characteristic", &Report::euler_characteristic)
       .def_readonly("genus", &Report::genus, "None unless the mesh is closed, manifold and oriented.")
-      .def_readonly("self_intersecting_pairs", &Report::self_intersecting_pairs, "None where nobody looked.")
+      .def_readonly("self_intersecting_pairs", &Report::self_intersecting_pairs, "None without a search.")
       .def_readonly("volume", &Report::volume, "World units.")
       .def_readonly("area", &Report::area, "World units.")
       .def_readonly("smallest_angle", &Report::smallest_angle, "Degrees.")
@@ -53,9 +53,9 @@ void bind_report(py::module_& m) {
       .def_readonly("certified_from_reference", &Report::certified_from_reference)
       .def_readonly("solid", &Report::solid,
                     "Compared with the reference's: \"same\", \"differs\" or \"unknown\".")
-      .def_readonly("defects", &Report::defects, "Those there are, with places.")
-      .def_readonly("sentences", &Report::sentences, "The verdict in words, most important first.")
-      .def_readonly("json", &Report::json, "All of it and more as one JSON object.")
+      .def_readonly("defects", &Report::defects, "The kinds that occur, with positions.")
+      .def_readonly("sentences", &Report::sentences, "The verdict, most important first.")
+      .def_readonly("json", &Report::json, "The report with more values as a JSON object.")
       .def(
           "to_dict",
           [](const Report& report) { return py::module_::import("json").attr("loads")(report.json); },
@@ -70,9 +70,9 @@ void bind_report(py::module_& m) {
         for (const std::string& sentence : report.sentences) all += (all.empty() ? "" : "\n") + sentence;
         return all;
       });
-  py::class_<FractureReport>(m, "FractureReport", "Whether the pieces of a fracture fit one another.")
+  py::class_<FractureReport>(m, "FractureReport", "The validation report of a fracture.")
       .def_readonly("consistent", &FractureReport::consistent,
-                    "Whether each piece is right by itself, and all fit without gap or overlap.")
+                    "True if each piece is valid, and all fit without gap or overlap.")
       .def_readonly("pieces", &FractureReport::pieces)
       .def_readonly("triangles", &FractureReport::triangles)
       .def_readonly("seam_triangles", &FractureReport::seam_triangles)
@@ -102,13 +102,11 @@ Report judged(const Mesh& mesh, const std::optional<Mesh>& reference, const std:
 
 PYBIND11_MODULE(_validation, m) {
   namespace py = pybind11;
-  m.doc() = "Bindings of the judges; use the package hermesh.";
+  m.doc() = "Bindings of validation; use the package hermesh.";
   // The types of meshes and exceptions are those of the other module.
   py::module_::import("hermesh._core");
   hermesh::python::bind_report(m);
   m.def("validate", &hermesh::python::judged);
-  m.def("validate_fracture", [](const std::vector<hermesh::Mesh>& pieces, hermesh::python::Watch& watch) {
-    return hermesh::python::watched(
-        watch, [&](hermesh::Context& context) { return hermesh::validate_fracture(pieces, context); });
-  });
+  m.def("validate_fracture",
+        hermesh::python::watching<const std::vector<hermesh::Mesh>&>(&hermesh::validate_fracture));
 }

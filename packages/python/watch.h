@@ -1,5 +1,5 @@
-// How the module's functions work: in a thread of their own, with the interpreter's lock released, while the
-// caller's thread delivers progress and looks whether somebody wants to stop.
+// Runs the module's functions in a thread of their own, with the interpreter's lock released, while the
+// caller's thread delivers progress and checks for cancellation.
 #pragma once
 
 #include <pybind11/pybind11.h>
@@ -22,20 +22,20 @@ namespace hermesh::python {
 
 namespace py = pybind11;
 
-/// What a call is given to be watched by, and what it has to say afterwards; one serves one call.
+/// Progress, cancellation and threads of a call, and its notes and times afterwards; one serves one call.
 struct Watch {
   py::object progress;         ///< None or a callable of the stage's name and the share done, 0 to 1
   py::object cancel;           ///< None or something with is_set(), such as threading.Event
-  std::optional<int> threads;  ///< at most; none: all of the machine
+  std::optional<int> threads;  ///< maximum; none: all of the machine
   std::vector<std::string> notes = {};
   std::vector<std::pair<std::string, double>> stage_seconds = {}, figures = {};
 };
 
-/// What is said from the thread that works to the one that waits.
+/// Reports from the working thread to the waiting one.
 class Reports {
  public:
-  /// Called by the working thread. Of reports that nobody has fetched yet the last of a stage replaces those
-  /// before it, but for its beginning, so that no stage goes by unseen.
+  /// Called by the working thread. A report replaces an earlier unread one of the stage, except for its
+  /// beginning, so that each stage is reported.
   void add(std::string_view stage, double fraction) {
     const std::lock_guard lock(mutex_);
     const bool replaces =
@@ -50,7 +50,7 @@ class Reports {
     finished_ = true;
     changed_.notify_one();
   }
-  /// Waits for the end, but no longer than that. Returns whether it has come, and what was reported.
+  /// Waits for the end, for at most `time`. Returns true after the end, and the new reports.
   std::pair<bool, std::vector<std::pair<std::string, double>>> wait(std::chrono::milliseconds time) {
     std::unique_lock lock(mutex_);
     changed_.wait_for(lock, time, [&] { return finished_; });
@@ -64,10 +64,9 @@ class Reports {
   bool finished_ = false;
 };
 
-/// Runs work(Context&) for a Python function. Ctrl-C is asked for by the caller's thread and not in reports
-/// of progress, since the interpreter answers the question in its main thread alone, and since some stages do
-/// not report for seconds. What the callback or the signal raises, or Cancelled where the cancel object is
-/// set, ends the work and comes out once it has ended.
+/// Runs work(Context&) for a Python function. The caller's thread checks for Ctrl-C, because the interpreter
+/// does so only in its main thread, and some stages do not report for seconds. An exception of the callback
+/// or the signal, or Cancelled if the cancel object is set, ends the work and is rethrown after its end.
 template <class Work>
 auto watched(Watch& watch, Work&& work) {
   using Result = std::invoke_result_t<Work, Context&>;
@@ -113,6 +112,15 @@ auto watched(Watch& watch, Work&& work) {
   if (raised) std::rethrow_exception(raised);
   if (thrown) std::rethrow_exception(thrown);
   return std::move(*result);
+}
+
+/// Returns a Python function of the parameters and a Watch that calls `function` with the parameters and a
+/// context.
+template <class... Parameters, class Function>
+auto watching(Function function) {
+  return [function](Parameters... given, Watch& watch) {
+    return watched(watch, [&](Context& context) { return function(given..., context); });
+  };
 }
 
 }  // namespace hermesh::python

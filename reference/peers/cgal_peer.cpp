@@ -74,7 +74,7 @@ peers::Mesh garland_heckbert(const peers::Mesh& mesh, double number) {
   return from_cgal(surface);
 }
 
-/// What `edge_collapse` does where nothing else is asked for, down to a number of edges.
+/// Simplifies by `edge_collapse` with its default parameters, down to a number of edges.
 peers::Mesh lindstrom_turk(const peers::Mesh& mesh, double number) {
   Surface surface = to_cgal(mesh);
   const std::size_t edges = peers::kept_triangles(mesh, number) * 3 / 2;

@@ -1,5 +1,5 @@
-// What the stand-alone peers share: a mesh of triangles, its OBJ file, and what they say of their time and
-// memory. Nothing of hermesh is included here, so that a peer is what its users would build.
+// Shared by the stand-alone peers: a mesh of triangles, its OBJ file, and the report of time and memory.
+// Nothing of hermesh is included here, so that a peer is equivalent to a program that its users would build.
 #pragma once
 
 #include <algorithm>
@@ -74,7 +74,7 @@ inline double status_bytes(const std::string& key) {
 /// Runs the work, and says on the standard output how long it took and how far the peak of resident memory
 /// rose (experiments/harness/command_extractor.h).
 inline void measured(const std::function<void()>& work) {
-  std::ofstream("/proc/self/clear_refs") << "5";  // the high-water mark is now what is resident
+  std::ofstream("/proc/self/clear_refs") << "5";  // sets the high-water mark to the resident size
   const double before = status_bytes("VmRSS");
   const auto start = std::chrono::steady_clock::now();
   work();

@@ -72,7 +72,7 @@ peers::Mesh flying_edges(const std::string& volume, int threads) {
   vtkNew<vtkFlyingEdges3D> edges;
   edges->SetInputData(image);
   edges->SetValue(0, 0.0);
-  // The class reference: what is not needed is to be switched off, for it costs time.
+  // The class reference recommends to switch off unneeded output, because it costs time.
   edges->ComputeNormalsOff();
   edges->ComputeGradientsOff();
   edges->ComputeScalarsOff();

@@ -1,14 +1,19 @@
 #include "validation/geometry/distance.h"
 
-#include <tbb/blocked_range.h>
-#include <tbb/parallel_reduce.h>
-
+#include <algorithm>
 #include <cmath>
+#include <numbers>
 
-#include "validation/geometry/surface_samples.h"
+#include "validation/geometry/sum_ranges.h"
 
 namespace hermesh::validation {
 namespace {
+
+// The powers of the inverse of the plastic number, the real root of x³ = x + 1.
+constexpr double kFirstStep = 0.7548776662466927;
+constexpr double kSecondStep = 0.5698402909980532;
+
+double fraction(double x) { return x - std::floor(x); }
 
 struct DistanceSums {
   double weight = 0.0, first = 0.0, second = 0.0;  // sums of weight, of distance and of its square
@@ -29,28 +34,21 @@ struct DistanceSums {
   }
 };
 
-// point(i) and weight(i) for i < count. Neighbours in the list tend to be neighbours in space, so that the
+// Sums over point(i) with weight(i) for i < count. Consecutive points tend to be close in space, so the
 // answer of one query is a good first guess for the next.
 template <class Point, class Weight>
 DistanceSums sum_distances(std::size_t count, const Point& point, const Weight& weight,
                            const TriangleTree& to, const RunContext& context) {
-  const auto add_range = [&](const tbb::blocked_range<std::size_t>& range, DistanceSums sums) {
-    context.check();
-    std::uint32_t guess = 0;
-    for (std::size_t i = range.begin(); i < range.end(); ++i) {
-      const Eigen::Vector3d p = point(i);
-      const ClosestHit hit = to.closest(p, guess);
-      guess = hit.slot;
-      sums.add(p, hit.squared, weight(i));
-    }
-    return sums;
-  };
-  const auto join = [](DistanceSums left, const DistanceSums& right) {
-    left.append(right);
-    return left;
-  };
-  return tbb::parallel_deterministic_reduce(tbb::blocked_range<std::size_t>(0, count, 512), DistanceSums{},
-                                            add_range, join);
+  return sum_ranges<DistanceSums>(count, 512, context,
+                                  [&](std::size_t begin, std::size_t end, DistanceSums& sums) {
+                                    std::uint32_t guess = 0;
+                                    for (std::size_t i = begin; i < end; ++i) {
+                                      const Eigen::Vector3d p = point(i);
+                                      const ClosestHit hit = to.closest(p, guess);
+                                      guess = hit.slot;
+                                      sums.add(p, hit.squared, weight(i));
+                                    }
+                                  });
 }
 
 void fill_means(const DistanceSums& sums, Distances& result) {
@@ -75,7 +73,49 @@ std::vector<std::uint32_t> used_points(const TriangleSoup& soup) {
   return list;
 }
 
+struct AngleSums {
+  double first = 0.0, second = 0.0, max = 0.0;
+  std::int64_t samples = 0;
+
+  void add(double angle) {
+    first += angle;
+    second += angle * angle;
+    max = std::max(max, angle);
+    ++samples;
+  }
+  void append(const AngleSums& later) {
+    first += later.first;
+    second += later.second;
+    max = std::max(max, later.max);
+    samples += later.samples;
+  }
+};
+
 }  // namespace
+
+SurfaceSamples::SurfaceSamples(const TriangleSoup& soup, std::int64_t count) : soup_(soup), count_(count) {
+  area_up_to_.reserve(soup.triangles.size());
+  double total = 0.0;
+  for (std::size_t t = 0; t < soup.triangles.size(); ++t) {
+    total += 0.5 * area_vector(soup.corners(t)).norm();
+    area_up_to_.push_back(total);
+  }
+  if (!(total > 0.0)) count_ = 0;
+}
+
+std::size_t SurfaceSamples::triangle(std::int64_t i) const {
+  const double area = area_up_to_.back() * ((double(i) + 0.5) / double(count_));
+  const auto found = std::upper_bound(area_up_to_.begin(), area_up_to_.end() - 1, area);
+  return std::size_t(found - area_up_to_.begin());
+}
+
+Eigen::Vector3d SurfaceSamples::operator[](std::int64_t i) const {
+  const Corners c = soup_.corners(triangle(i));
+  double u = fraction(double(i) * kFirstStep), v = fraction(double(i) * kSecondStep);
+  // Fold the half of the unit square outside of the triangle onto it.
+  if (u + v > 1.0) u = 1.0 - u, v = 1.0 - v;
+  return c[0] + u * (c[1] - c[0]) + v * (c[2] - c[0]);
+}
 
 Distances sampled_distances(const TriangleSoup& from, const TriangleTree& to, std::int64_t samples,
                             RunContext& context) {
@@ -103,6 +143,31 @@ Distances point_distances(const std::vector<WeightedPoint>& points, const Triang
   result.samples = std::int64_t(points.size());
   fill_means(sums, result);
   fill_maximum(sums, result);
+  return result;
+}
+
+NormalAngles sampled_normal_angles(const TriangleSoup& from, const TriangleTree& to, std::int64_t samples,
+                                   RunContext& context) {
+  const SurfaceSamples surface(from, samples);
+  const AngleSums sums = sum_ranges<AngleSums>(
+      std::size_t(surface.size()), 512, context, [&](std::size_t begin, std::size_t end, AngleSums& angles) {
+        std::uint32_t guess = 0;
+        for (auto i = std::int64_t(begin); i < std::int64_t(end); ++i) {
+          const ClosestHit hit = to.closest(surface[i], guess);
+          guess = hit.slot;
+          const Eigen::Vector3d own = area_vector(from.corners(surface.triangle(i))),
+                                other = area_vector(to.corners(hit.slot));
+          if (!(own.norm() > 0.0) || !(other.norm() > 0.0)) continue;
+          // The tangent of the angle from both products is accurate for small and for large angles.
+          angles.add(std::atan2(own.cross(other).norm(), own.dot(other)) * (180.0 / std::numbers::pi));
+        }
+      });
+  NormalAngles result;
+  result.samples = sums.samples;
+  if (sums.samples == 0) return result;
+  result.mean = sums.first / double(sums.samples);
+  result.rms = std::sqrt(sums.second / double(sums.samples));
+  result.max = sums.max;
   return result;
 }
 

@@ -4,15 +4,15 @@
 #include <tbb/global_control.h>
 
 #include <cmath>
+#include <functional>
 #include <numbers>
 #include <random>
 
-#include "validation/geometry/surface_samples.h"
 #include "validation/geometry/test_meshes.h"
 #include "validation/hausdorff.h"
 
 namespace hermesh::validation {
-namespace {
+namespace distance_test {
 
 using namespace test;
 
@@ -33,10 +33,10 @@ HausdorffBound bound(const MeshFile& from, const MeshFile& to, double gap) {
   return certified_distance(TriangleSoup(from), TriangleTree(TriangleSoup(to)), gap, context);
 }
 
-void expect_brackets(const HausdorffBound& b, double truth, double gap) {
+void expect_brackets(const HausdorffBound& b, double truth, double gap, double slack = 1e-7) {
   EXPECT_LE(b.lower, truth);
   EXPECT_GE(b.upper, truth);
-  EXPECT_LE(b.upper - b.lower, gap * 1.001 + 1e-7);
+  EXPECT_LE(b.upper - b.lower, gap * 1.001 + slack);
 }
 
 // The distance to a triangle by its definition: the least over a fine lattice of its points.
@@ -213,5 +213,133 @@ TEST(Hausdorff, FarFromTheOrigin) {
   expect_brackets(bound(outer, inner, 1e-4), std::sqrt(0.75), 1e-4);
 }
 
-}  // namespace
+/// A square of side 2 about the z axis, turned by an angle about the x axis; its normal is +z for 0.
+MeshFile leaning_square(double degrees) {
+  const double radians = degrees * std::numbers::pi / 180.0;
+  MeshFile mesh;
+  for (const auto& [x, y] : {std::pair{-1.0, -1.0}, {1.0, -1.0}, {1.0, 1.0}, {-1.0, 1.0}})
+    mesh.points.emplace_back(x, y * std::cos(radians), y * std::sin(radians));
+  mesh.quads.push_back({0, 1, 2, 3});
+  return mesh;
+}
+
+NormalAngles angles(const MeshFile& from, const MeshFile& to) {
+  RunContext context;
+  const TriangleSoup from_soup(from), to_soup(to);
+  return sampled_normal_angles(from_soup, TriangleTree(to_soup), 1000, context);
+}
+
+TEST(NormalError, IsTheAngleBetweenTwoPlanes) {
+  for (const double degrees : {0.0, 1e-3, 17.0, 90.0, 179.0}) {
+    const NormalAngles found = angles(leaning_square(degrees), leaning_square(0.0));
+    EXPECT_NEAR(found.mean, degrees, 1e-9);
+    EXPECT_NEAR(found.rms, degrees, 1e-9);
+    EXPECT_NEAR(found.max, degrees, 1e-9);
+    EXPECT_EQ(found.samples, 1000);
+  }
+}
+
+TEST(NormalError, DetectsASurfaceThatIsInsideOut) {
+  MeshFile reversed = leaning_square(0.0);
+  reversed.quads[0] = {3, 2, 1, 0};
+  EXPECT_NEAR(angles(reversed, leaning_square(0.0)).mean, 180.0, 1e-9);
+}
+
+TEST(NormalError, AveragesOverTheArea) {
+  // Half of the area leans by 60 degrees: the mean is 30, the rms 60/√2.
+  MeshFile both = leaning_square(0.0);
+  const MeshFile leaning = leaning_square(60.0);
+  for (const Eigen::Vector3d& p : leaning.points) both.points.push_back(p + Eigen::Vector3d(0, 0, 5));
+  both.quads.push_back({4, 5, 6, 7});
+  MeshFile flat = leaning_square(0.0);
+  for (Eigen::Vector3d& p : flat.points) p *= 100.0;
+  const NormalAngles found = angles(both, flat);
+  EXPECT_NEAR(found.mean, 30.0, 1e-9);
+  EXPECT_NEAR(found.rms, 60.0 / std::sqrt(2.0), 1e-9);
+}
+
+TEST(NormalError, LeavesOutTrianglesWithoutArea) {
+  MeshFile needle = leaning_square(10.0);
+  needle.triangles.push_back({0, 1, 1});
+  EXPECT_NEAR(angles(needle, leaning_square(0.0)).max, 10.0, 1e-9);
+}
+
+constexpr double kSlack = 3.9e-7;  // the bracket is widened by 1e-7 of a diagonal of √2 on both sides
+
+// The unit square in n × n cells of two triangles each, lifted to z(x, y).
+MeshFile sheet(int n, const std::function<double(double, double)>& z) {
+  MeshFile mesh;
+  for (int i = 0; i <= n; ++i)
+    for (int j = 0; j <= n; ++j) {
+      const double x = double(i) / n, y = double(j) / n;
+      mesh.points.emplace_back(x, y, z(x, y));
+    }
+  const auto point = [n](int i, int j) { return std::uint32_t(i * (n + 1) + j); };
+  for (int i = 0; i < n; ++i)
+    for (int j = 0; j < n; ++j)
+      mesh.quads.push_back({point(i, j), point(i + 1, j), point(i + 1, j + 1), point(i, j + 1)});
+  return mesh;
+}
+
+// Two large triangles over 7442 small ones, at most a thousandth of a cell's width away. Halving alone would
+// refine to that size along all sides of the cells, which takes half a minute. The greatest distance is that
+// of the raised side of the tilted square to the side of the flat one. (The number of cells is odd, because
+// halving would otherwise follow their sides.)
+TEST(TriangleCover, LargeTrianglesOverSmallOnes) {
+  const double height = 1.0 / 65536, gap = 1.0 / 524288;
+  const MeshFile flat = sheet(61, [](double, double) { return 0.0; });
+  const MeshFile tilted = sheet(1, [&](double x, double) { return height * x; });
+  expect_brackets(bound(tilted, flat, gap), height, gap, kSlack);
+  // In the other direction it is that of the same points to the tilted plane, with feet within the square.
+  expect_brackets(bound(flat, tilted, gap), height / std::sqrt(1.0 + height * height), gap, kSlack);
+}
+
+// The plane z = 0 over a roof with the ridge at x = 1/2: at u from the ridge the distance to the plane z =
+// −u/8 is u/8 / √(1 + 1/64), and greatest at u = 1/2.
+TEST(TriangleCover, OverARidge) {
+  const MeshFile plane = sheet(1, [](double, double) { return 0.0; });
+  const MeshFile roof = sheet(46, [](double x, double) { return -0.125 * std::abs(x - 0.5); });
+  expect_brackets(bound(plane, roof, 1e-5), 0.0625 / std::sqrt(1.0 + 1.0 / 64), 1e-5, kSlack);
+}
+
+// 2 × 2 cells of the fine sheet are missing: the middle of the hole is a cell's width from the others.
+TEST(TriangleCover, OverAHole) {
+  MeshFile fine = sheet(40, [](double, double) { return 0.0; });
+  const std::size_t corner = 20 * 40 + 20;
+  for (const std::size_t cell : {corner + 41, corner + 40, corner + 1, corner})
+    fine.quads.erase(fine.quads.begin() + std::ptrdiff_t(cell));
+  expect_brackets(bound(sheet(1, [](double, double) { return 0.0; }), fine, 1e-5), 1.0 / 40, 1e-5, kSlack);
+}
+
+// No point of the piece is farther from the surface than the bound.
+TEST(TriangleCover, BoundsAllPoints) {
+  const MeshFile mesh = torus(60, 30);
+  const TriangleSoup soup(mesh);
+  const TriangleTree tree(soup);
+  std::mt19937 random(3);
+  std::uniform_real_distribution<double> uniform(-1.0, 1.0);
+  const auto offset = [&](double size) {
+    return Eigen::Vector3d(size * uniform(random), size * uniform(random), size * uniform(random));
+  };
+  int found = 0;
+  for (int i = 0; i < 2000; ++i) {
+    const Corners& near = tree.corners(random() % tree.size());
+    const double size = i % 2 == 0 ? 0.05 : 0.15, limit = i % 3 == 0 ? 0.01 : 0.05;
+    Corners piece;
+    for (Eigen::Vector3d& corner : piece)
+      corner = tree.closest(near[0] + offset(size)).point + offset(0.5 * limit);
+    const double bound = cover_bound(piece, tree, 1.0, limit);
+    if (!std::isfinite(bound)) continue;
+    ++found;
+    EXPECT_LE(bound, limit);
+    for (int a = 0; a <= 12; ++a)
+      for (int b = 0; a + b <= 12; ++b) {
+        const Eigen::Vector3d p = piece[0] + (piece[1] - piece[0]) * a / 12 + (piece[2] - piece[0]) * b / 12;
+        EXPECT_LE(std::sqrt(tree.closest(p).squared), bound + 1e-12);
+      }
+  }
+  EXPECT_GT(found, 200);
+}
+
+}  // namespace distance_test
 }  // namespace hermesh::validation

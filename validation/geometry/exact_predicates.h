@@ -1,5 +1,5 @@
-// Predicates on points in double precision whose answers are exact. A floating-point filter answers the clear
-// cases here; CGAL's exact kernel answers the rest, behind this light header.
+// Exact predicates on points in double precision: a floating-point filter decides the clear cases, CGAL's
+// exact kernel the others, behind this light header.
 #pragma once
 
 #include <Eigen/Core>
@@ -10,15 +10,15 @@
 namespace hermesh::validation {
 
 namespace exact {
-/// orientation() below by CGAL's exact kernel, which is slower.
+/// Returns orientation() below by CGAL's exact kernel, which is slower.
 int orientation(const Eigen::Vector3d& a, const Eigen::Vector3d& b, const Eigen::Vector3d& c,
                 const Eigen::Vector3d& d);
 }  // namespace exact
 
-/// The exact orientation of four points: 1 if abc turns counter-clockwise seen from d, −1 if clockwise, 0 if
-/// the four points lie in one plane. The bound of the filter is Shewchuk's (Adaptive Precision Floating-Point
-/// Arithmetic and Fast Robust Geometric Predicates, 1997); it does not cover underflow, hence the floor under
-/// the permanent.
+/// Returns the exact orientation of four points: 1 if abc turns counter-clockwise seen from d, −1 if
+/// clockwise, 0 if the four points lie in one plane. The bound of the filter is Shewchuk's (Adaptive
+/// Precision Floating-Point Arithmetic and Fast Robust Geometric Predicates, 1997); it does not cover
+/// underflow, hence the floor under the permanent.
 inline int orientation(const Eigen::Vector3d& a, const Eigen::Vector3d& b, const Eigen::Vector3d& c,
                        const Eigen::Vector3d& d) {
   const Eigen::Vector3d u = b - a, v = c - a, w = d - a;
@@ -36,19 +36,20 @@ inline int orientation(const Eigen::Vector3d& a, const Eigen::Vector3d& b, const
   return exact::orientation(a, b, c, d);
 }
 
-/// True if the triangle has exactly zero area.
+/// Returns true if the triangle has exactly zero area.
 bool collinear(const Eigen::Vector3d& a, const Eigen::Vector3d& b, const Eigen::Vector3d& c);
 inline bool collinear(const Corners& t) { return collinear(t[0], t[1], t[2]); }
 
-/// For four points in one plane, p ≠ q and neither r nor s on the line pq: true if r and s are on one side of
-/// it.
+/// Returns true if r and s are on one side of the line pq, for four points in one plane, p ≠ q and neither r
+/// nor s on the line.
 bool same_side(const Eigen::Vector3d& p, const Eigen::Vector3d& q, const Eigen::Vector3d& r,
                const Eigen::Vector3d& s);
 
-/// True if the closed segment, of more than one point, and the closed triangle, of more than zero area, meet.
+/// Returns true if the closed segment, of more than one point, and the closed triangle, of more than zero
+/// area, meet.
 bool segment_meets_triangle(const Eigen::Vector3d& p, const Eigen::Vector3d& q, const Corners& t);
 
-/// True if two closed triangles, of more than zero area each, meet.
+/// Returns true if two closed triangles, of more than zero area each, meet.
 bool triangles_meet(const Corners& s, const Corners& t);
 
 }  // namespace hermesh::validation

@@ -9,9 +9,10 @@ namespace {
 
 using Eigen::Vector3d;
 
-/// The least difference of two cosines, or of a ratio of squared lengths from 1, that is no rounding error.
+/// The least difference of two cosines, or of a ratio of squared lengths from 1, above rounding errors.
 constexpr double kAlike = 1e-9;
-/// How far off a plane, as a part of its longest side, a plane quad may be in a file of single precision.
+/// Largest distance of a plane quad from its plane in a file of single precision, as a share of its longest
+/// side.
 constexpr double kPlane = 1e-6;
 
 bool is_plane(const Vector3d& a, const Vector3d& b, const Vector3d& c, const Vector3d& d) {
@@ -20,7 +21,7 @@ bool is_plane(const Vector3d& a, const Vector3d& b, const Vector3d& c, const Vec
   return std::abs(u.dot(v.cross(w))) <= kPlane * longest * longest * longest;
 }
 
-/// One of two ways to cut a quad into two triangles.
+/// One of the two cuts of a quad into two triangles.
 struct Halves {
   Vector3d first, second;  ///< normals of the two triangles, of twice their areas
   double squared_length;   ///< squared length of the diagonal
@@ -28,8 +29,8 @@ struct Halves {
   Halves(const Vector3d& a, const Vector3d& b, const Vector3d& c, const Vector3d& d)
       : first((b - a).cross(c - a)), second((c - a).cross(d - a)), squared_length((c - a).squaredNorm()) {}
 
-  /// Whether both halves face with the whole, which is the same for either diagonal. A half that is there by
-  /// rounding alone has no area.
+  /// Returns true if both halves face with the whole, which is the same for either diagonal. A half that is
+  /// only a rounding error has no area.
   bool proper() const {
     const Vector3d whole = first + second;
     const double least = kAlike * whole.squaredNorm();

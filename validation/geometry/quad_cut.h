@@ -1,4 +1,4 @@
-// Along which diagonal a judge cuts a quad.
+// The diagonals along which validation cuts quads.
 #pragma once
 
 #include <Eigen/Core>
@@ -8,26 +8,27 @@
 
 namespace hermesh::validation {
 
-/// How a quad is cut into triangles. A quad (a,b,c,d) means abc and acd (polygon_mesh.h), and who makes a
-/// quad that is not plane says by this order which of two surfaces it is. But a plane quad has one surface
-/// only, and if it is concave it must be cut along the diagonal inside it, whichever corner the file begins
-/// with.
+/// How a quad is cut into triangles. A quad (a,b,c,d) means abc and acd (polygon_mesh.h), so the order of the
+/// corners of a quad that is not plane decides between two surfaces. A plane quad has only one surface, and
+/// if concave it must be cut along the diagonal inside it, regardless of its first corner.
 enum class QuadRule {
-  /// The rule for the mesh that is judged: a quad is cut along a–c, unless it is plane, a half by a–c faces
-  /// against the quad as a whole or has no area, and no half by b–d does so.
+  /// For the validated mesh: a quad is cut along a–c, unless it is plane, a half by a–c faces against the
+  /// quad as
+  /// a whole or has no area, and no half by b–d does so.
   as_given,
-  /// The rule for a reference from elsewhere, whose order of corners means nothing. If the halves by one
-  /// diagonal alone all face with the quad and have an area, that diagonal is taken, whether the quad is
-  /// plane or not; else the one across which the quad bends less; if it bends alike across both, the shorter
-  /// one; and if they are equally long, the one with the lowest point number. This is how hermesh reads such
-  /// a file when it makes a volume of it.
+  /// For a reference from elsewhere, whose order of corners is arbitrary. If the halves by only one diagonal
+  /// all
+  /// face with the quad and have an area, that diagonal is taken, even if the quad is not plane; else the one
+  /// across which the quad bends less; if both bend equally, the shorter one; and if they are equally long,
+  /// the
+  /// one with the lowest point number. hermesh uses this rule when it voxelizes such a file.
   better,
 };
 
-/// Whether the rule cuts a quad (a,b,c,d) into abd and bcd, and not into abc and acd.
+/// Returns true if the rule cuts a quad (a,b,c,d) into abd and bcd instead of abc and acd.
 bool cut_along_other(const std::vector<Eigen::Vector3d>& points, const Quad& quad, QuadRule rule);
 
-/// The quad with its corners in an order by which (a,b,c,d) means the triangles that the rule cuts it into.
+/// Returns the quad with its corners rotated so that the rule cuts (a,b,c,d) into abc and acd.
 inline Quad cut_from_first(const std::vector<Eigen::Vector3d>& points, const Quad& q, QuadRule rule) {
   return cut_along_other(points, q, rule) ? Quad{q[1], q[2], q[3], q[0]} : q;
 }

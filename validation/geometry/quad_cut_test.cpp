@@ -11,7 +11,7 @@
 #include "validation/mesh_report.h"
 
 namespace hermesh::validation {
-namespace {
+namespace quad_cut_test {
 
 using namespace test;
 
@@ -32,7 +32,7 @@ MeshFile dart_prism(int turn) {
 TEST(QuadCut, VerdictOnAConcaveQuadDoesNotDependOnWhereItStarts) {
   for (int turn = 0; turn < 4; ++turn) {
     RunContext context;
-    const MeshReport r = judge(dart_prism(turn), {}, context);
+    const MeshReport r = check_mesh(dart_prism(turn), {}, context);
     EXPECT_NEAR(r.area, 2.0 + 2.0 * std::sqrt(2.5) + 4.0, 1e-12) << turn;
     EXPECT_NEAR(r.volume, 1.0, 1e-12) << turn;
     EXPECT_EQ(r.self_intersections->pairs, 0) << turn;
@@ -52,7 +52,7 @@ TEST(QuadCut, ACornerInLineWithItsNeighboursMakesNoDegenerateTriangle) {
     mesh.quads = {{0, 1, 2, 3}};
     std::rotate(mesh.quads[0].begin(), mesh.quads[0].begin() + turn, mesh.quads[0].end());
     RunContext context;
-    const MeshReport r = judge(mesh, {}, context);
+    const MeshReport r = check_mesh(mesh, {}, context);
     EXPECT_EQ(r.degenerate_polygons, 0) << turn;
     EXPECT_NEAR(r.area, 2.0, 1e-12) << turn;
   }
@@ -102,5 +102,5 @@ TEST(QuadCut, TheHalvesAreThoseOfTheWhole) {
   }
 }
 
-}  // namespace
+}  // namespace quad_cut_test
 }  // namespace hermesh::validation

@@ -58,6 +58,12 @@ MeshFile extrusion(const std::vector<Eigen::Vector2d>& profile, double depth) {
   return mesh;
 }
 
+MeshFile reversed(MeshFile mesh) {
+  for (Triangle& t : mesh.triangles) std::swap(t[0], t[1]);
+  for (Quad& q : mesh.quads) std::swap(q[1], q[3]);
+  return mesh;
+}
+
 MeshFile together(MeshFile a, const MeshFile& b) {
   const std::uint32_t base = std::uint32_t(a.points.size());
   a.points.insert(a.points.end(), b.points.begin(), b.points.end());

@@ -1,4 +1,4 @@
-// Meshes for the tests of the judges, small enough to count by hand.
+// Meshes for the tests of validation, small enough to count by hand.
 #pragma once
 
 #include "algorithms/io/mesh_file.h"
@@ -19,6 +19,9 @@ MeshFile prism(int sides);
 
 /// A profile, counter-clockwise and convex, swept from z = 0 to `depth`, in quads, with fans at both ends.
 MeshFile extrusion(const std::vector<Eigen::Vector2d>& profile, double depth);
+
+/// Returns the mesh with all polygons reversed.
+MeshFile reversed(MeshFile mesh);
 
 /// Two meshes as one, each with points of its own.
 MeshFile together(MeshFile a, const MeshFile& b);

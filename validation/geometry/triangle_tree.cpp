@@ -4,7 +4,6 @@
 #include <tbb/parallel_for.h>
 #include <tbb/parallel_invoke.h>
 
-#include <Eigen/Geometry>
 #include <algorithm>
 
 #include "algorithms/core/error.h"
@@ -32,7 +31,7 @@ Eigen::Vector3d closest_on_edges(const Corners& t, const Eigen::Vector3d& p) {
   return best;
 }
 
-// Sorted whole by the median splits, so that a comparison touches no other memory.
+// Contains all that the median splits compare, so that they access no other memory.
 struct Item {
   std::array<float, 3> centre;
   std::uint32_t triangle;
@@ -96,8 +95,7 @@ TriangleTree::TriangleTree(const TriangleSoup& soup) {
   const std::size_t n = soup.triangles.size();
   if (n == 0) throw Error("a mesh without polygons has no surface to measure a distance to");
   while ((n >> depth_) > kLeafSize && depth_ < kMaxDepth) ++depth_;
-  // Centres are relative to the first point: in single precision a mesh far from the origin would lose its
-  // shape.
+  // Centres are relative to the first point, because single precision is too coarse far from the origin.
   const Eigen::Vector3d origin = soup.points[soup.triangles[0][0]];
   std::vector<Item> items(n);
   const auto chunks = tbb::blocked_range<std::size_t>(0, n, 4096);

@@ -9,15 +9,15 @@
 
 namespace hermesh::validation {
 
-/// The point of a triangle that is closest to `point`. A triangle whose height is below 1e-8 of its longest
-/// edge counts as its three edges: its normal is all rounding error, and the answer then is off by no more
-/// than that height.
+/// Returns the point of a triangle that is closest to `point`. A triangle whose height is below 1e-8 of its
+/// longest edge is treated as its three edges, because its normal is dominated by rounding errors; the error
+/// of the result is then at most that height.
 Eigen::Vector3d closest_point(const Corners& triangle, const Eigen::Vector3d& point);
 
 struct ClosestHit {
   double squared = std::numeric_limits<double>::infinity();  ///< squared distance
   Eigen::Vector3d point = Eigen::Vector3d::Zero();
-  std::uint32_t slot = 0;  ///< place of the triangle in the order of the tree
+  std::uint32_t slot = 0;  ///< position of the triangle in the order of the tree
 };
 
 /// A bounding volume hierarchy as a complete binary tree in heap order: the children of node i are 2i+1 and
@@ -29,8 +29,8 @@ class TriangleTree {
   explicit TriangleTree(const TriangleSoup& soup);
 
   ClosestHit closest(const Eigen::Vector3d& point) const { return closest(point, slot_hit(point, 0)); }
-  /// The closest point, sought from a first guess, such as the slot of the answer to a query nearby, which
-  /// makes the search faster.
+  /// Returns the closest point; a first guess, such as the slot found for a nearby point, speeds up the
+  /// search.
   ClosestHit closest(const Eigen::Vector3d& point, std::uint32_t guess) const {
     return closest(point, slot_hit(point, guess));
   }
@@ -44,50 +44,22 @@ class TriangleTree {
   const Corners& corners(std::size_t slot) const { return corners_[slot]; }
 
   /// Calls visit(slot) for each triangle whose box is within `reach` of a box, until visit() returns false.
-  /// Returns whether it never did.
+  /// Returns true if it never did.
   template <class Visit>
   bool for_each_near(const Box& box, double reach, const Visit& visit) const {
     const double squared = reach * reach;
-    std::size_t stack[kMaxDepth + 2];
-    int top = 0;
-    stack[top++] = 0;
-    while (top > 0) {
-      const std::size_t node = stack[--top];
-      if (boxes_[node].squared_distance(box) > squared) continue;
-      if (node < leaves() - 1) {
-        stack[top++] = 2 * node + 2;
-        stack[top++] = 2 * node + 1;
-        continue;
-      }
-      const std::size_t leaf = node - (leaves() - 1);
-      for (std::size_t slot = first_slot(leaf); slot < first_slot(leaf + 1); ++slot)
-        if (box_of(corners_[slot]).squared_distance(box) <= squared && !visit(std::uint32_t(slot)))
-          return false;
-    }
-    return true;
+    return traverse([&](const Box& node) { return node.squared_distance(box) <= squared; },
+                    [&](std::uint32_t slot) {
+                      return !(box_of(corners_[slot]).squared_distance(box) <= squared) || visit(slot);
+                    });
   }
 
-  /// Calls visit(slot) for each triangle whose box the segment meets, and for some more, until visit()
+  /// Calls visit(slot) for each triangle whose box the segment meets, and for some others, until visit()
   /// returns false. Returns true if it never did.
   template <class Visit>
   bool for_each_on_segment(const Eigen::Vector3d& from, const Eigen::Vector3d& to, const Visit& visit) const {
     const Slabs slabs(from, to);
-    std::size_t stack[kMaxDepth + 2];
-    int top = 0;
-    stack[top++] = 0;
-    while (top > 0) {
-      const std::size_t node = stack[--top];
-      if (!slabs.meet(boxes_[node])) continue;
-      if (node < leaves() - 1) {
-        stack[top++] = 2 * node + 2;
-        stack[top++] = 2 * node + 1;
-        continue;
-      }
-      const std::size_t leaf = node - (leaves() - 1);
-      for (std::size_t slot = first_slot(leaf); slot < first_slot(leaf + 1); ++slot)
-        if (!visit(std::uint32_t(slot))) return false;
-    }
-    return true;
+    return traverse([&](const Box& node) { return slabs.meet(node); }, visit);
   }
 
   /// Calls visit(other) for each leaf `other` ≥ `leaf` whose box meets that leaf's box, in increasing order.
@@ -116,8 +88,29 @@ class TriangleTree {
  private:
   static constexpr int kMaxDepth = 40;
 
-  // A segment against boxes: the interval of its parameter between each pair of planes, a little widened, so
-  // that rounding loses no box.
+  // Calls visit(slot) for the triangles of all leaves below nodes whose boxes enter() accepts, until visit()
+  // returns false. Returns true if it never did.
+  template <class Enter, class Visit>
+  bool traverse(const Enter& enter, const Visit& visit) const {
+    std::size_t stack[kMaxDepth + 2];
+    int top = 0;
+    stack[top++] = 0;
+    while (top > 0) {
+      const std::size_t node = stack[--top];
+      if (!enter(boxes_[node])) continue;
+      if (node < leaves() - 1) {
+        stack[top++] = 2 * node + 2;
+        stack[top++] = 2 * node + 1;
+        continue;
+      }
+      const std::size_t leaf = node - (leaves() - 1);
+      for (std::size_t slot = first_slot(leaf); slot < first_slot(leaf + 1); ++slot)
+        if (!visit(std::uint32_t(slot))) return false;
+    }
+    return true;
+  }
+
+  // The intervals of a segment's parameter between the planes of boxes, slightly enlarged to cover rounding.
   struct Slabs {
     Eigen::Vector3d from, inverse;
     Slabs(const Eigen::Vector3d& start, const Eigen::Vector3d& end)
@@ -128,7 +121,7 @@ class TriangleTree {
       for (int axis = 0; axis < 3; ++axis) {
         const double a = (box.lower[axis] - from[axis]) * inverse[axis];
         const double b = (box.upper[axis] - from[axis]) * inverse[axis];
-        // Of a segment in a plane of the box, 0 times infinity is no number and bounds nothing.
+        // For a segment in a plane of the box, 0 times infinity is NaN and bounds nothing.
         if (std::min(a, b) - kSlack > first) first = std::min(a, b) - kSlack;
         if (std::max(a, b) + kSlack < last) last = std::max(a, b) + kSlack;
       }

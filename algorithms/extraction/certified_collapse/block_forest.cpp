@@ -1,14 +1,13 @@
-#include "algorithms/extraction/certified_collapse/block_forest.h"
-
 #include <tbb/enumerable_thread_specific.h>
 #include <tbb/parallel_sort.h>
 
 #include <algorithm>
 #include <bit>
 #include <cmath>
-#include <numeric>
 
+#include "algorithms/core/disjoint_sets.h"
 #include "algorithms/core/parallel.h"
+#include "algorithms/extraction/certified_collapse/merge_proposals.h"
 
 namespace hermesh {
 namespace {
@@ -16,31 +15,28 @@ namespace {
 using Eigen::Vector3d;
 
 constexpr int kLevels = 4;  ///< blocks of 2^kLevels voxels are the largest
-/// A node's point may be this share of the tolerance from the planes that it stands for, root mean square.
-/// (With 0.45 some tenth of the points come back in the proof, on CAD three quarters, and with 0.1 bold
+/// Largest root mean square distance of a node's vertex from the planes that it represents, in tolerances.
+/// (With 0.45 the proof undoes some tenth of the merged vertices, on CAD three quarters; with 0.1 bold
 /// collapses take three times as long.)
 constexpr double kShare = 0.3;
-/// The share of a collapse's greatest cost that a node's planes may cost, where there is one. (Without this
-/// bound blocks leave a mesh twice as far away as collapses alone; with a tenth they cost 2 % of the
-/// distance, with a fiftieth nothing, and save half of the time.)
+/// Largest cost of a node's planes, as a share of the largest cost of a collapse if there is one. (Without
+/// this limit blocks leave a mesh twice as far away as collapses would; a tenth costs 2 % of the distance, a
+/// fiftieth nothing, and saves half of the time.)
 constexpr double kMomentShare = 0.05;
 
-/// Makes the trees of sets in one block of the largest kind after another. One object for each thread.
+/// Builds the trees of sets in one block of the largest size after another. One object for each thread.
 class BlockTrees {
  public:
-  BlockTrees(const FineMesh& fine, std::span<const float> tolerance, std::span<const std::uint8_t> pinned,
-             double moment, const FilePoints& file)
-      : fine_(fine), tolerance_(tolerance), pinned_(pinned), moment_(moment), file_(file) {}
+  explicit BlockTrees(const DecimationInput& input) : in_(input), fine_(input.fine) {}
 
-  /// Makes the sets of the block whose points are in `order` from `begin` to `end`. `position` has each
-  /// point's place in `order`. Writes node_of of these points, counted from 0, and appends to `nodes`,
-  /// children first.
+  /// Builds the sets of the block whose vertices are in `order` from `begin` to `end`. `position` has the
+  /// index in `order` of each vertex. Writes node_of of these vertices, counted from 0, and appends to
+  /// `nodes`, children first.
   void run(std::span<const std::uint32_t> order, std::span<const std::uint32_t> position, std::uint32_t begin,
            std::uint32_t end, std::vector<std::uint32_t>& node_of, std::vector<MergeForest::Node>& nodes) {
     points_ = order.subspan(begin, end - begin);
     sums_.assign(points_.size(), Sum());
-    parent_.resize(points_.size());
-    std::iota(parent_.begin(), parent_.end(), 0u);
+    sets_ = DisjointSets(points_.size());
     node_at_.assign(points_.size(), MergeForest::kNone);
     cells_.resize(points_.size());
     anchor_ = fine_.points()[points_[0]];
@@ -50,10 +46,10 @@ class BlockTrees {
   }
 
  private:
-  /// What a set adds up to; places and quadrics are those of its points.
+  /// Sums over the vertices of a set.
   struct Sum {
     std::uint32_t points = 1, first = 0;
-    std::int32_t euler = 1;  ///< points - edges + triangles
+    std::int32_t euler = 1;  ///< vertices - edges + triangles
     float tolerance = 0;
     Vector3d places = Vector3d::Zero();
     WideQuadric quadric;
@@ -73,80 +69,73 @@ class BlockTrees {
     const std::uint32_t p = points_[i];
     Sum& sum = sums_[i];
     sum.first = p;
-    sum.tolerance = tolerance_[p];
+    sum.tolerance = in_.tolerance[p];
     sum.places = fine_.points()[p];
     sum.quadric.add(quadric_at(fine_, p), sum.places - anchor_);
     for (int a = 0; a < 3; ++a) cells_[i][a] = static_cast<std::int32_t>(std::floor(sum.places[a]));
   }
 
-  /// The level of the least block that holds two points: the highest bit in which their cells differ. Two's
-  /// complement makes blocks below zero as wide as the others.
+  /// Returns the level of the smallest block that contains two vertices: the highest bit in which their cells
+  /// differ. In two's complement blocks at negative coordinates have the same width.
   int level(std::uint32_t i, std::uint32_t j) const {
     std::uint32_t differ = 1;
-    for (int a = 0; a < 3; ++a) differ |= static_cast<std::uint32_t>((cells_[i][a] ^ cells_[j][a]));
+    for (int a = 0; a < 3; ++a) differ |= static_cast<std::uint32_t>(cells_[i][a] ^ cells_[j][a]);
     return std::bit_width(differ);
   }
 
-  /// Lists the edges and triangles whose points are all in the block and not pinned, by the level of the
-  /// least block that holds them. So an edge of a level connects points of different smaller blocks, never of
-  /// one set.
+  /// Lists the edges and triangles whose vertices are all in the block and not pinned, by the level of the
+  /// smallest block that contains them. So an edge of a level connects different smaller blocks, never
+  /// vertices of one set.
   void gather(std::span<const std::uint32_t> position, std::uint32_t begin, std::uint32_t end) {
     for (auto& edges : edges_) edges.clear();
     for (auto& triangles : triangles_) triangles.clear();
     const auto joins = [&](std::uint32_t p) {
-      return position[p] >= begin && position[p] < end && !pinned_[p];
+      return position[p] >= begin && position[p] < end && !in_.pinned[p];
     };
     for (std::uint32_t i = 0; i < points_.size(); ++i) {
       const std::uint32_t p = points_[i];
-      if (pinned_[p]) continue;
+      if (in_.pinned[p]) continue;
       for (const std::uint32_t t : fine_.around(p)) {
         const Triangle& corners = fine_.triangles()[t];
         const std::uint32_t q = fine_.next(t, p);
         if (!joins(q)) continue;
         const std::uint32_t j = position[q] - begin;
         const int of_edge = level(i, j);
-        // In a closed and oriented mesh an edge is met once each way.
+        // In a closed and oriented mesh an edge occurs once in each direction.
         if (p < q) edges_[of_edge - 1].push_back({i, j});
         if (corners[0] != p || !joins(corners[2])) continue;
-        // The least block that holds a first corner and each of the others holds all three.
+        // The smallest block that contains the first corner and each of the others contains all three.
         triangles_[std::max(of_edge, level(i, position[corners[2]] - begin)) - 1].push_back(i);
       }
     }
   }
 
-  /// The root of a point's set, with paths halved.
-  std::uint32_t find(std::uint32_t i) {
-    while (parent_[i] != i) i = parent_[i] = parent_[parent_[i]];
-    return i;
-  }
-
-  /// Joins what the edges of a level connect to sets, and makes a node for each.
+  /// Joins the sets that the edges of a level connect, and makes a node for each result.
   void merge(int level, std::vector<std::uint32_t>& node_of, std::vector<MergeForest::Node>& nodes) {
     merged_.clear();
     const auto first_new = static_cast<std::uint32_t>(nodes.size());
-    // Union: each set or single point that becomes part of a new set is noted once, with its node so far.
+    // Each set or single vertex that becomes part of a new set is listed once, with its node so far.
     for (const auto& [i, j] : edges_[level - 1]) {
-      const std::uint32_t a = find(i), b = find(j);
+      const std::uint32_t a = sets_.find(i), b = sets_.find(j);
       if (a == b) continue;
       for (const std::uint32_t root : {a, b})
         if (node_at_[root] == MergeForest::kNone || node_at_[root] < first_new)
           merged_.push_back({root, node_at_[root]});
-      parent_[b] = a;
-      sums_[a].add(sums_[b]);
-      node_at_[a] = first_new;  // some new node
+      const std::uint32_t joined = sets_.join(a, b);
+      sums_[joined].add(sums_[joined == a ? b : a]);
+      node_at_[joined] = first_new;  // marks a new set
     }
-    // Only now, for the sets of this level are known: an edge or a triangle lies in the set of any of its
-    // points.
-    for (const auto& [i, j] : edges_[level - 1]) --sums_[find(i)].euler;
-    for (const std::uint32_t i : triangles_[level - 1]) ++sums_[find(i)].euler;
-    // One new node for each root; sets and single points of before become its children. A set that does not
-    // merge gets one as well, for a larger one around it may.
-    for (const auto& [root, node] : merged_) node_at_[find(root)] = MergeForest::kNone;
+    // Only now are the sets of this level known; an edge or a triangle is in the set of any of its vertices.
+    for (const auto& [i, j] : edges_[level - 1]) --sums_[sets_.find(i)].euler;
+    for (const std::uint32_t i : triangles_[level - 1]) ++sums_[sets_.find(i)].euler;
+    // One new node for each set; the former sets and single vertices become its children. A set that does not
+    // merge gets a node as well, because a larger one around it may merge.
+    for (const auto& [root, node] : merged_) node_at_[sets_.find(root)] = MergeForest::kNone;
     for (const auto& [root, node] : merged_) {
-      std::uint32_t& at = node_at_[find(root)];
+      std::uint32_t& at = node_at_[sets_.find(root)];
       if (at == MergeForest::kNone) {
         at = static_cast<std::uint32_t>(nodes.size());
-        nodes.push_back(node_of_sum(sums_[find(root)], level));
+        nodes.push_back(node_of_sum(sums_[sets_.find(root)], level));
       }
       if (node == MergeForest::kNone)
         node_of[points_[root]] = at;
@@ -158,8 +147,8 @@ class BlockTrees {
   MergeForest::Node node_of_sum(const Sum& sum, int level) const {
     MergeForest::Node node;
     node.first = sum.first;
-    // Connected, with Euler characteristic 1: a disc or a tree, which can shrink to a point without a change
-    // of topology.
+    // Connected with Euler characteristic 1: a disc or a tree, which shrinks to a point without a change of
+    // topology.
     if (sum.euler != 1) return node;
     const Vector3d middle = sum.places / double(sum.points);
     WideQuadric q = sum.quadric;  // about the middle
@@ -168,34 +157,31 @@ class BlockTrees {
     q.b += q.a * shift;
     Vector3d x = q.minimiser();
     const double reach = double(1 << level);
-    // Planes that are nearly parallel meet far away: no farther than the block is wide.
+    // Nearly parallel planes meet far away: limited to the width of the block.
     if (x.squaredNorm() > reach * reach) x *= reach / x.norm();
     const double off = q(x);
     node.merges = off <= kShare * kShare * double(sum.tolerance) * double(sum.tolerance) * q.a.trace() &&
-                  (moment_ <= 0 || off <= kMomentShare * moment_);
+                  (in_.moment <= 0 || off <= kMomentShare * in_.moment);
     if (!node.merges) return node;
-    node.place = file_.rounded(middle + x);
+    node.place = in_.file.rounded(middle + x);
     node.quadric = q.about(node.place - middle);
     return node;
   }
 
+  const DecimationInput& in_;
   const FineMesh& fine_;
-  const std::span<const float> tolerance_;
-  const std::span<const std::uint8_t> pinned_;
-  const double moment_;
-  const FilePoints& file_;
   std::span<const std::uint32_t> points_;
   Vector3d anchor_;
   std::vector<std::array<std::int32_t, 3>> cells_;
-  std::vector<Sum> sums_;               ///< one per point; a root's is that of its set
-  std::vector<std::uint32_t> parent_;   ///< disjoint sets of points
+  std::vector<Sum> sums_;  ///< by vertex; of a root that of its set
+  DisjointSets sets_;
   std::vector<std::uint32_t> node_at_;  ///< node of each root, or kNone
   std::array<std::vector<std::pair<std::uint32_t, std::uint32_t>>, kLevels> edges_;
-  std::array<std::vector<std::uint32_t>, kLevels> triangles_;  ///< one corner of each, for each level
+  std::array<std::vector<std::uint32_t>, kLevels> triangles_;  ///< one corner of each, by level
   std::vector<std::pair<std::uint32_t, std::uint32_t>> merged_;
 };
 
-/// The number of the largest block that a place is in: 21 bits an axis.
+/// Returns the number of the largest block that contains a position: 21 bits an axis.
 std::uint64_t block_key(const Vector3d& p) {
   std::uint64_t key = 0;
   for (int a = 0; a < 3; ++a)
@@ -206,11 +192,9 @@ std::uint64_t block_key(const Vector3d& p) {
 
 }  // namespace
 
-MergeForest block_forest(const FineMesh& fine, std::span<const float> tolerance,
-                         std::span<const std::uint8_t> pinned, double moment, const FilePoints& file,
-                         const RunContext& context) {
-  const std::vector<Vector3d>& points = fine.points();
-  // Points by block, in each by number: one order for every number of threads.
+MergeForest block_forest(const DecimationInput& input, const RunContext& context) {
+  const std::vector<Vector3d>& points = input.fine.points();
+  // Vertices by block, then by index, so that the order does not depend on the thread schedule.
   std::vector<std::pair<std::uint64_t, std::uint32_t>> keys(points.size());
   parallel_blocks(points.size(), context, [&](std::size_t p) {
     keys[p] = {block_key(points[p]), static_cast<std::uint32_t>(p)};
@@ -224,12 +208,11 @@ MergeForest block_forest(const FineMesh& fine, std::span<const float> tolerance,
   }
   first.push_back(static_cast<std::uint32_t>(points.size()));
 
-  // Blocks share no points and no edges count between them, so each makes its trees by itself.
+  // Blocks share no vertices, and edges between them do not count, so blocks are independent.
   std::vector<std::uint32_t> node_of(points.size(), MergeForest::kNone);
   const std::size_t n = first.size() - 1;
   std::vector<std::vector<MergeForest::Node>> nodes(n);
-  tbb::enumerable_thread_specific<BlockTrees> trees(
-      [&] { return BlockTrees(fine, tolerance, pinned, moment, file); });
+  tbb::enumerable_thread_specific<BlockTrees> trees([&] { return BlockTrees(input); });
   parallel_blocks(n, context, [&](std::size_t b) {
     trees.local().run(order, position, first[b], first[b + 1], node_of, nodes[b]);
   });

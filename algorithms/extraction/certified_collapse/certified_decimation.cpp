@@ -1,51 +1,38 @@
 #include "algorithms/extraction/certified_collapse/certified_decimation.h"
 
-#include <span>
-
-#include "algorithms/extraction/certified_collapse/block_forest.h"
-#include "algorithms/extraction/certified_collapse/decimation.h"
 #include "algorithms/extraction/certified_collapse/merge_proof.h"
-#include "algorithms/extraction/certified_collapse/relaxation.h"
+#include "algorithms/extraction/certified_collapse/merge_proposals.h"
 
 namespace hermesh {
-namespace {
-
-/// Once more is worth its time where a pass and its proof had this share fewer points in the end than before.
-constexpr double kWorthAnother = 0.05;
-constexpr int kMostPasses = 3;
-
-}  // namespace
 
 CertifiedMesh decimate_certified(const FineMesh& fine, const std::vector<float>& tolerance,
                                  std::vector<std::uint8_t> pinned, const FilePoints& file,
                                  RunContext& context, const Nearness& nearness,
                                  std::span<const TrianglePieces> pieces) {
-  // Where no distance is allowed nothing may move, whatever the caller has pinned.
+  // Another pass is worth its time if the last one and its proof removed this share of the vertices.
+  constexpr double kWorthAnother = 0.05;
+  constexpr int kMostPasses = 3;
   pinned.resize(tolerance.size());
   for (std::size_t p = 0; p < tolerance.size(); ++p)
     if (!(tolerance[p] > 0)) pinned[p] = 1;
+  const DecimationInput input{fine, tolerance, pinned, nearness.moment, file};
   const auto timed = [&](const char* name, auto&& work) {
     Stage stage(context, name);
     return work();
   };
-  // *Propose* by blocks, the cheapest way by far to be rid of most points, and by collapses that look at the
-  // quadrics alone. Only the topology is looked at yet: distances are proved once edges have been collapsed
-  // with care, too.
-  MergeForest forest = timed(
-      "decimate", [&] { return block_forest(fine, tolerance, pinned, nearness.moment, file, context); });
+  // Blocks are by far the cheapest way to remove most vertices. Until careful collapses have run, only the
+  // topology is tested.
+  MergeForest forest = timed("decimate", [&] { return block_forest(input, context); });
   MergeProof proof(forest, fine, tolerance, context, pieces);
   const auto collapse = [&](std::span<const std::uint8_t> where, Collapses kind) {
-    timed("decimate", [&] {
-      collapse_edges(forest, proof.merged(), where, fine, tolerance, pinned, kind, nearness.moment, file,
-                     context);
-    });
+    timed("decimate", [&] { collapse_edges(forest, proof.merged(), where, input, kind, context); });
   };
   timed("decimate", [&] { proof.sort_out(); });
   collapse({}, Collapses::bold);
   timed("decimate", [&] { proof.sort_out(); });
   collapse({}, Collapses::careful);
   timed("certify", [&] { proof.prove(); });
-  // Where the proof has split sets there is room again.
+  // Where the proof has split sets, further collapses are possible.
   for (int i = 0; i < kMostPasses; ++i) {
     const double before = double(proof.merged().leaders.size());
     const std::vector<std::uint8_t> brought_back(proof.brought_back().begin(), proof.brought_back().end());
@@ -54,9 +41,7 @@ CertifiedMesh decimate_certified(const FineMesh& fine, const std::vector<float>&
     if (double(proof.merged().leaders.size()) > (1.0 - kWorthAnother) * before) break;
   }
   if (nearness.relaxation > 0) {
-    timed("relax", [&] {
-      propose_relaxation(forest, proof.merged(), fine, tolerance, pinned, nearness.relaxation, file, context);
-    });
+    timed("relax", [&] { propose_relaxation(forest, proof.merged(), input, nearness.relaxation, context); });
     timed("certify", [&] { proof.prove(); });
   }
   const MergedMesh& merged = proof.merged();

@@ -1,4 +1,4 @@
-// Proof that a triangle is nowhere farther from a mesh than a bound.
+// Certifies that a triangle is nowhere farther from a mesh than a bound.
 #pragma once
 
 #include <algorithm>
@@ -12,30 +12,27 @@
 
 namespace hermesh {
 
-/// How much the proved distance may exceed the bound, voxels: so that pieces need not get smaller than this.
+/// Largest excess of the proved distance over the bound, voxels: pieces need not get smaller than this.
 inline constexpr double kDistanceSlack = 0.005;
 
 /// Proves that triangles are near a mesh, one after another.
 ///
-/// **Why it holds.** Most triangles are covered by the mesh right above or below, no farther away than the
-/// bound (triangle_overlay.h). The others, at creases and rims, are cut into pieces until each is covered so,
-/// or until its corners are within the bound of one triangle of the mesh (the distance to a convex set is
-/// convex), or until it is so small that its middle's distance and its radius add up to no more than the
-/// bound and kDistanceSlack. It may fail to prove what is true: the mesh is searched for the nearest triangle
-/// only nearby, and there is an end to the pieces.
+/// **Why it holds.** Most triangles are covered by the mesh directly above or below, no farther away than the
+/// bound (triangle_overlay.h). The others, at creases and boundaries, are cut into pieces until each is
+/// covered so, or until its corners are within the bound of one triangle of the mesh (the distance to a
+/// convex set is convex), or until its middle's distance and its radius add up to no more than the bound and
+/// kDistanceSlack. The proof may fail although the triangle is near: the nearest triangle of the mesh is
+/// searched only locally, and the number of pieces is limited.
 class DistanceCertificate {
  public:
   DistanceCertificate(const FineMesh& mesh, TriangleOverlay& overlay) : mesh_(mesh), overlay_(overlay) {}
 
-  /// Whether each place of the triangle is proved to be within the bound of the mesh.
-  /// @param triangle the triangle asked about
+  /// Returns true if the whole triangle is proved to be within the bound of the mesh.
   /// @param start a triangle of the mesh near it
-  /// @param bound called with a face of the mesh: how near the triangle has to be to that, voxels; it is
-  /// called for
-  ///   every face that the proof rests on
+  /// @param bound returns the largest distance from a given face of the mesh, voxels; called for every face
+  ///   that the proof rests on
   /// @param seen called with faces of the mesh that are over some of the triangle and within their bounds
-  /// there, as by
-  ///   TriangleOverlay::is_near()
+  ///   there, as by TriangleOverlay::is_near()
   template <class Bound, class Seen>
   bool holds(const Corners& triangle, std::uint32_t start, const Bound& bound, Seen&& seen) {
     const Eigen::Vector3d middle = (triangle[0] + triangle[1] + triangle[2]) / 3.0;
@@ -46,7 +43,7 @@ class DistanceCertificate {
   }
 
  private:
-  /// A triangle of the mesh, and how near to it a piece has to be.
+  /// A triangle of the mesh, and the largest distance of a piece from it.
   struct Face {
     TriangleReach reach;
     double within;
@@ -55,8 +52,8 @@ class DistanceCertificate {
     }
   };
 
-  /// Whether a piece is near, whole or cut in halves. `last` is the face that was nearest to what the piece
-  /// is cut from, or null.
+  /// Returns true if a piece is near, whole or halved. `last` is the face nearest to the triangle from which
+  /// the piece is cut, or null.
   template <class Bound>
   bool holds_in_pieces(const Corners& piece, std::uint32_t start, const Bound& bound, const Face* last) {
     if (last && last->is_near(piece)) return true;

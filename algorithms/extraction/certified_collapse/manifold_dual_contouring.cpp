@@ -18,12 +18,29 @@ CertifiedPolygons by_collapses(UniformMesh uniform, const FieldAtPoints& field, 
   CertifiedMesh coarse = decimate_certified(fine, asked, {}, file, context, nearness);
   CertifiedPolygons result{std::move(coarse.points), std::move(coarse.triangles), {}, {}};
   if (field.leaves_out_outside())
-    // What has moved was merged; what is in the mask has a tolerance.
+    // Vertices that moved were merged; vertices in the mask have a tolerance.
     show(result, [&](std::size_t t, int corner, std::uint32_t point) {
       const std::uint32_t before = fine.triangles()[coarse.fine_triangle[t]][corner];
       return asked[before] > 0 && result.points[point] != fine.points()[before];
     });
   return result;
+}
+
+/// The options of the collapses in addition to those of all certified extractors.
+const OptionTable<Nearness>& nearness_option_table() {
+  static const auto table =
+      OptionTable<Nearness>()
+          .number(
+              "moment", &Nearness::moment, {.maximum = 1e30},
+              "greatest sum of squared distances to the planes of the triangles around, weighted by "
+              "their areas, that the collapse of an edge may cost, in voxels^4: beside a larger tolerance "
+              "it gives triangles to where they lower the root mean square distance most; 0 for as few as "
+              "the tolerance allows")
+          .choice("relaxation", &Nearness::relaxation, {{"0", 0}, {"1", 1}, {"3", 3}, {"6", 6}},
+                  "sweeps that move the points to where the root mean square distance to the uniform mesh is "
+                  "least, as far as the tolerance and the freedom from self-intersection are proved; 3 get "
+                  "most of it");
+  return table;
 }
 
 }  // namespace
@@ -41,27 +58,6 @@ PolygonMesh manifold_dual_contouring(const HermiteView& grid, const ManifoldDual
           : by_collapses(std::move(uniform), at_points, options.tolerance, options.nearness, file, context),
       at_points, file, context);
 }
-
-namespace {
-
-/// The options that the collapses have beyond those of all certified extractors.
-const OptionTable<Nearness>& nearness_option_table() {
-  static const auto table =
-      OptionTable<Nearness>()
-          .number("moment", &Nearness::moment, {.maximum = 1e30},
-                  "greatest sum of squared distances to the planes of the triangles around, weighted by "
-                  "their areas, that "
-                  "the collapse of an edge may cost, in voxels^4: beside a larger tolerance it gives "
-                  "triangles to where they "
-                  "lower the root mean square distance most; 0 for as few as the tolerance allows")
-          .choice("relaxation", &Nearness::relaxation, {{"0", 0}, {"1", 1}, {"3", 3}, {"6", 6}},
-                  "sweeps that move the points to where the root mean square distance to the uniform mesh is "
-                  "least, as far "
-                  "as the tolerance and the freedom from self-intersection are proved; 3 get most of it");
-  return table;
-}
-
-}  // namespace
 
 PolygonMesh manifold_dual_contouring(const ExtractionInput& input) {
   ManifoldDualContouringOptions options{.nearness = nearness_option_table().read(input.options),

@@ -17,7 +17,7 @@
 #include "algorithms/search/triangle_tree.h"
 
 namespace hermesh {
-namespace {
+namespace manifold_dual_contouring_test {
 
 using Eigen::Vector3d;
 
@@ -56,10 +56,27 @@ struct TurnedCube {
   }
 };
 
-PolygonMesh contour(const FloatHermite& hermite, double tolerance, const AdaptivityField* field = nullptr) {
+PolygonMesh contour(const FloatHermite& hermite, const ManifoldDualContouringOptions& options,
+                    const AdaptivityField* field = nullptr) {
   RunContext context;
-  return manifold_dual_contouring(view_of(hermite, context), {.tolerance = tolerance, .uniform = {}}, field,
-                                  context);
+  return manifold_dual_contouring(view_of(hermite, context), options, field, context);
+}
+PolygonMesh contour(const FloatHermite& hermite, double tolerance, const AdaptivityField* field = nullptr) {
+  return contour(hermite, {.tolerance = tolerance, .uniform = {}}, field);
+}
+
+/// Values between −1 and 1 at random.
+FloatHermite noise(int x_size, int y_size, int z_size, unsigned seed) {
+  initialize_openvdb();
+  RunContext context;
+  const auto grid = openvdb::FloatGrid::create(1.0f);
+  auto access = grid->getAccessor();
+  std::mt19937 random(seed);
+  std::uniform_real_distribution<float> value(-1.0f, 1.0f);
+  for (int x = 0; x < x_size; ++x)
+    for (int y = 0; y < y_size; ++y)
+      for (int z = 0; z < z_size; ++z) access.setValue({x, y, z}, value(random));
+  return sample_level_set(make_level_set(grid), 0.0, context);
 }
 
 double volume(const PolygonMesh& mesh) {
@@ -85,10 +102,8 @@ TEST(ManifoldDualContouring, SphereStaysWithinTheTolerance) {
 TEST(ManifoldDualContouring, AveragePlacementNeedsNoNormals) {
   FloatHermite hermite = TurnedCube().hermite();
   const auto average = [&] {
-    RunContext context;
-    const ManifoldDualContouringOptions options{
-        .tolerance = 0, .uniform = {.placement = DualContouringOptions::Placement::average}};
-    return manifold_dual_contouring(view_of(hermite, context), options, nullptr, context);
+    return contour(hermite,
+                   {.tolerance = 0, .uniform = {.placement = DualContouringOptions::Placement::average}});
   };
   const PolygonMesh with_normals = average();  // by vector code
   for (EdgeCrossing& crossing : hermite.crossings) crossing.normal = {};
@@ -117,7 +132,7 @@ TEST(ManifoldDualContouring, TurnedCubeNeedsFewTrianglesAndKeepsItsCorners) {
   EXPECT_NEAR(volume(mesh), 8000.0, 0.1 * 2400.0);
 }
 
-/// Mean distance from places along the edges of the turned cube to the mesh.
+/// Mean distance from positions along the edges of the turned cube to the mesh.
 double mean_distance_from_edges(const TurnedCube& cube, const PolygonMesh& mesh) {
   double sum = 0.0;
   int places = 0;
@@ -146,8 +161,8 @@ std::int64_t euler_characteristic(const PolygonMesh& mesh) {
   return static_cast<std::int64_t>(mesh.points.size()) - triangles / 2;
 }
 
-/// A plate along a diagonal of the lattice whose samples touch one another across faces alone, and the same
-/// plate as a gap that cuts a box in two: either is whole.
+/// A plate along a diagonal of the lattice whose samples touch one another only across faces, and the same
+/// plate as a gap that cuts a box in two: either is connected.
 TEST(ManifoldDualContouring, ThinDiagonalPlatesAndGapsStayWhole) {
   const auto distance_to = [](const Vector3d& half, const Vector3d& p) {
     return (p.cwiseAbs() - half).maxCoeff();
@@ -178,7 +193,7 @@ TEST(ManifoldDualContouring, ThinDiagonalPlatesAndGapsStayWhole) {
 }
 
 /// Inside corners of a convex solid that touch across a face belong together: cut off one by one they would
-/// leave notches in the cube's edges.
+/// leave notches in the edges.
 TEST(ManifoldDualContouring, TurnedCubeHasNoNotches) {
   for (const double angle : {0.1, 0.35, 0.6, 0.7854}) {
     TurnedCube cube;
@@ -201,35 +216,24 @@ TEST(ManifoldDualContouring, TurnedCubeKeepsItsEdges) {
                Eigen::AngleAxisd(0.35, Vector3d::UnitX()))
                   .matrix();
   const FloatHermite hermite = cube.hermite();
-  RunContext context;
-  const auto contoured = [&](double reach) {
-    ManifoldDualContouringOptions options{.tolerance = 0.0, .uniform = {}};
-    options.uniform.reach = reach;
-    return manifold_dual_contouring(view_of(hermite, context), options, nullptr, context);
+  const auto distance = [&](double reach) {
+    return mean_distance_from_edges(cube, contour(hermite, {.tolerance = 0, .uniform = {.reach = reach}}));
   };
-  EXPECT_LT(mean_distance_from_edges(cube, contoured(1.0)), 0.01);
-  EXPECT_GT(mean_distance_from_edges(cube, contoured(0.0)), 0.02);  // where no point leaves its cell
+  EXPECT_LT(distance(1.0), 0.01);
+  EXPECT_GT(distance(0.0), 0.02);  // no vertex leaves its cell
 }
 
-TEST(ManifoldDualContouring, ScaleOfZeroKeepsEveryPoint) {
-  const FloatHermite hermite = sphere();
-  initialize_openvdb();
-  AdaptivityField field;
-  field.scale = make_level_set(openvdb::FloatGrid::create(0.0f));
-  EXPECT_EQ(contour(hermite, 1.0, &field).points.size(), contour(hermite, 0.0).points.size());
-}
-
-/// A tolerance of 0 somewhere must not cost the merging elsewhere.
-TEST(ManifoldDualContouring, ScaleOfZeroInOneHalfLeavesTheOtherToMerge) {
+/// A tolerance of 0 somewhere must not prevent merges elsewhere.
+TEST(ManifoldDualContouring, ScaleOfZeroKeepsEveryVertexThereAndMergesElsewhere) {
   const FloatHermite hermite = sphere();
   initialize_openvdb();
   const auto scale = openvdb::FloatGrid::create(0.0f);
-  scale->fill(openvdb::CoordBBox(openvdb::Coord(0, -30, -30), openvdb::Coord(30, 30, 30)), 1.0f);
   AdaptivityField field;
   field.scale = make_level_set(scale);
-  RunContext context;
-  const PolygonMesh mesh =
-      manifold_dual_contouring(view_of(hermite, context), {.tolerance = 0.5, .uniform = {}}, &field, context);
+  EXPECT_EQ(contour(hermite, 1.0, &field).points.size(), contour(hermite, 0.0).points.size());
+  scale->fill(openvdb::CoordBBox(openvdb::Coord(0, -30, -30), openvdb::Coord(30, 30, 30)), 1.0f);
+  field.scale = make_level_set(scale);
+  const PolygonMesh mesh = contour(hermite, 0.5, &field);
   const auto count = [](const PolygonMesh& of, float from, float to) {
     return std::ranges::count_if(of.points,
                                  [&](const Eigen::Vector3f& p) { return p[0] > from && p[0] < to; });
@@ -264,12 +268,9 @@ TEST(ManifoldDualContouring, MaskLimitsTheMeshOrTheBound) {
 /// The mesh of certified_octree() or of manifold_dual_contouring().
 PolygonMesh certified(bool octree, const FloatHermite& hermite, double tolerance,
                       const AdaptivityField* field) {
+  if (!octree) return contour(hermite, tolerance, field);
   RunContext context;
-  if (octree)
-    return certified_octree(view_of(hermite, context), {.tolerance = tolerance, .uniform = {}}, field,
-                            context);
-  return manifold_dual_contouring(view_of(hermite, context), {.tolerance = tolerance, .uniform = {}}, field,
-                                  context);
+  return certified_octree(view_of(hermite, context), {.tolerance = tolerance, .uniform = {}}, field, context);
 }
 
 /// A flat face becomes two triangles, and the middles of both may be far from a mask that shows some of it.
@@ -296,15 +297,15 @@ TEST(ManifoldDualContouring, MaskLosesNothingOfWhatItShows) {
       double area = 0;
       for (const Triangle& t : triangulated(mesh))
         area += 0.5 * (mesh.world(t[1]) - mesh.world(t[0])).cross(mesh.world(t[2]) - mesh.world(t[0])).norm();
-      // The disc, but for a cell along its rim.
+      // The disc, except for a cell along its boundary.
       EXPECT_GT(area, std::numbers::pi * (kMask - 1) * (kMask - 1)) << octree << ' ' << tolerance;
       EXPECT_LT(area, std::numbers::pi * (kMask + 1) * (kMask + 1)) << octree << ' ' << tolerance;
       EXPECT_LT(mesh.triangle_count(), 220u);  // of some 400
     }
 }
 
-/// A mask of just the cells that the surface passes through leaves out nothing, though merged polygons lie
-/// beside them.
+/// A mask of only the cells that the surface passes through excludes nothing, though merged polygons lie next
+/// to them.
 TEST(ManifoldDualContouring, MaskOfTheSurfacesOwnCellsLeavesOutNothing) {
   initialize_openvdb();
   const FloatHermite hermite = sphere();
@@ -351,8 +352,10 @@ TEST(ManifoldDualContouring, ToleranceInTheWorldHoldsAlongTheLongestSideOfAVoxel
   EXPECT_FALSE(contoured("tolerance_world", "1") == contoured("tolerance", "1"));
 }
 
-/// Share of the cells that are held to their segments, of the last mesh made with the context.
-double share_held(const RunContext& context) {
+/// Share of the cells that are held to their segments in the uniform mesh.
+double share_held(const FloatHermite& hermite) {
+  RunContext context;
+  manifold_dual_contouring(view_of(hermite, context), {.tolerance = 0.0, .uniform = {}}, nullptr, context);
   const auto figure = [&](const std::string& name) {
     return std::ranges::find(context.figures, name, [](const auto& entry) { return entry.first; })->second;
   };
@@ -360,19 +363,10 @@ double share_held(const RunContext& context) {
 }
 
 TEST(ManifoldDualContouring, NeedsTheLastResortInHardlyACellOfWhiteNoise) {
-  initialize_openvdb();
-  auto grid = openvdb::FloatGrid::create(1.0f);
-  auto access = grid->getAccessor();
-  std::mt19937 random(11);
-  std::uniform_real_distribution<float> value(-1.0f, 1.0f);
-  for (int i = 0; i < 20 * 20 * 20; ++i) access.setValue({i / 400, i / 20 % 20, i % 20}, value(random));
-  RunContext context;
-  const FloatHermite hermite = sample_level_set(make_level_set(grid), 0.0, context);
-  manifold_dual_contouring(view_of(hermite, context), {.tolerance = 0.0, .uniform = {}}, nullptr, context);
-  EXPECT_LT(share_held(context), 0.005);
+  EXPECT_LT(share_held(noise(20, 20, 20, 11)), 0.005);
 }
 
-/// Most cells have two sheets, beside many of their kind.
+/// Most cells have two sheets, next to many of their kind.
 TEST(ManifoldDualContouring, NeedsNoLastResortForAThinPlate) {
   RunContext context;
   const Vector3d across = Vector3d(3, 5, 2).normalized();
@@ -385,10 +379,9 @@ TEST(ManifoldDualContouring, NeedsNoLastResortForAThinPlate) {
                        : p;
           },
   };
-  const FloatHermite hermite =
-      sample_function(surface, IndexToWorld(), {-20, -20, -20}, {20, 20, 20}, 1e-9, context);
-  manifold_dual_contouring(view_of(hermite, context), {.tolerance = 0.0, .uniform = {}}, nullptr, context);
-  EXPECT_EQ(share_held(context), 0.0);
+  EXPECT_EQ(
+      share_held(sample_function(surface, IndexToWorld(), {-20, -20, -20}, {20, 20, 20}, 1e-9, context)),
+      0.0);
 }
 
 /// Two axes of the lattice nearly on one line: the nearer, the more voxels single precision's rounding is.
@@ -401,14 +394,7 @@ TEST(ManifoldDualContouring, RefusesALatticeOnWhichRoundingCouldMovePointsAcross
 }
 
 TEST(ManifoldDualContouring, SameBytesAtAnyThreadCount) {
-  RunContext context;
-  initialize_openvdb();
-  auto grid = openvdb::FloatGrid::create(1.0f);
-  auto access = grid->getAccessor();
-  std::mt19937 random(3);
-  std::uniform_real_distribution<float> value(-1.0f, 1.0f);
-  for (int i = 0; i < 5 * 5 * 64; ++i) access.setValue({i / (5 * 64), i / 64 % 5, i % 64}, value(random));
-  const FloatHermite hermite = sample_level_set(make_level_set(grid), 0.0, context);
+  const FloatHermite hermite = noise(5, 5, 64, 3);
   std::vector<PolygonMesh> meshes;
   for (const std::size_t threads : {1, 2, 7}) {
     tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
@@ -419,5 +405,5 @@ TEST(ManifoldDualContouring, SameBytesAtAnyThreadCount) {
   EXPECT_TRUE(meshes[0] == meshes[2]);
 }
 
-}  // namespace
+}  // namespace manifold_dual_contouring_test
 }  // namespace hermesh

@@ -10,14 +10,14 @@ MergeForest::MergeForest(std::vector<Node> nodes, std::vector<std::uint32_t> nod
 }
 
 void MergeForest::join(std::uint32_t going, Node node) {
-  // The new node is above both points' sets, or above the points themselves where they are in none.
   const auto number = static_cast<std::uint32_t>(nodes_.size());
-  // Sets above the one that merges do not: nothing is lost with them.
+  // The sets above the one that merges do not merge, so nothing is lost when the new node replaces them.
   for (const std::uint32_t point : {going, node.first}) {
     std::uint32_t& above = set_of_[point] == kNone ? node_of_[point] : nodes_[set_of_[point]].parent;
     above = number;
   }
-  // Enough for further joins, which only ask for points that are still there; settle() finds the others.
+  // Sufficient for further joins, which only read the set of a vertex that remains; settle() finds the
+  // others.
   set_of_[node.first] = number;
   nodes_.push_back(std::move(node));
 }
@@ -25,8 +25,8 @@ void MergeForest::join(std::uint32_t going, Node node) {
 void MergeForest::settle() {
   const std::size_t n = nodes_.size();
   std::vector<std::uint32_t> top(n, kNone);
-  // Parents come behind their children, so downwards each node finds what its parent has: the greatest set
-  // that merges.
+  // Parents follow their children, so downwards each node inherits from its parent the largest set that
+  // merges.
   for (std::size_t i = n; i-- > 0;) {
     const std::uint32_t parent = nodes_[i].parent;
     if (parent != kNone) top[i] = top[parent];
@@ -37,10 +37,10 @@ void MergeForest::settle() {
     set_of_[p] = node_of_[p] == kNone ? kNone : top[node_of_[p]];
     if (node_of_[p] != kNone) ++count_[node_of_[p]];
   }
-  // Upwards, the points of a set are those of its children and its own.
+  // Upwards, a set has the members of its children and its own.
   for (std::size_t i = 0; i < n; ++i)
     if (nodes_[i].parent != kNone) count_[nodes_[i].parent] += count_[i];
-  // Each set's members follow one another: those of its children, then its own points.
+  // The members of each set are contiguous: those of its children, then its own.
   begin_.resize(n);
   std::vector<std::uint32_t> next(n);
   std::uint32_t total = 0;
@@ -56,7 +56,7 @@ void MergeForest::settle() {
 
 void MergeForest::split(std::uint32_t node) {
   nodes_[node].merges = false;
-  // The greatest set below the one that is split is the last that merges on the way up to it.
+  // The largest set below the split one is the last that merges on the path up to it.
   for (const std::uint32_t p : members(node)) {
     set_of_[p] = kNone;
     for (std::uint32_t n = node_of_[p]; n != node; n = nodes_[n].parent)

@@ -1,4 +1,4 @@
-// Which points of a fine mesh become one: sets of points, each made of smaller ones.
+// Sets of vertices of a fine mesh that become one vertex, each built from smaller sets.
 #pragma once
 
 #include <Eigen/Core>
@@ -10,40 +10,40 @@
 
 namespace hermesh {
 
-/// A forest: a node is a set of points, its children are the sets and single points that it is made of; a
-/// node with one child is a move of that. The points that a mesh has are the greatest sets that merge, and
-/// those that are in none. A set that is split gives way to its children; so whatever was unproven is taken
-/// back right there, and at last one has the fine mesh again.
+/// A forest: a node is a set of vertices, its children are the sets and single vertices that it is made of; a
+/// node with one child moves that child. The vertices of the merged mesh are the largest sets that merge, and
+/// those vertices that are in none. A set that is split is replaced by its children, so an unproven merge is
+/// undone locally, and full splitting restores the fine mesh.
 class MergeForest {
  public:
   static constexpr std::uint32_t kNone = 0xffffffffu;
 
   struct Node {
     std::uint32_t parent = kNone;
-    std::uint32_t first;  ///< one of its points, which it goes by
+    std::uint32_t first;  ///< the vertex that represents the set
     bool merges = false;
-    bool moves = false;     ///< its only child is the set or single point that it moves
-    Eigen::Vector3d place;  ///< where its points go, rounded for the file
+    bool moves = false;     ///< its only child is the set or single vertex that it moves
+    Eigen::Vector3d place;  ///< position of the merged vertex, rounded for the file
     PlaneQuadric quadric;   ///< about `place`
   };
 
-  /// `nodes` has children before their parents; `node_of` has for each point the least set that holds it, or
-  /// kNone.
+  /// `nodes` has children before their parents; `node_of` has for each vertex the smallest set that contains
+  /// it, or kNone.
   MergeForest(std::vector<Node> nodes, std::vector<std::uint32_t> node_of);
 
-  /// Makes two points of the mesh one, in the place of `node`, whose `first` is the one that stays. Where
-  /// `going` is `first`, too, that point moves to the place of `node`.
+  /// Merges two vertices of the merged mesh into `node`, which the vertex `node.first` represents. If `going`
+  /// is `node.first`, that vertex moves to the position of `node`.
   void join(std::uint32_t going, Node node);
-  /// Finds the sets and members anew. To be called after join(), before anything else is asked.
+  /// Recomputes the sets and their members. Required after join(), before any query.
   void settle();
-  /// Has a set give way to its children.
+  /// Replaces a set by its children.
   void split(std::uint32_t node);
 
   const Node& node(std::uint32_t n) const { return nodes_[n]; }
   std::size_t size() const { return nodes_.size(); }
-  /// The set that a point is merged into, or kNone.
+  /// Returns the set that a vertex is merged into, or kNone.
   std::uint32_t set_of(std::uint32_t point) const { return set_of_[point]; }
-  /// The point that its set goes by.
+  /// Returns the vertex that represents the set of a vertex.
   std::uint32_t leader(std::uint32_t point) const {
     return set_of_[point] == kNone ? point : nodes_[set_of_[point]].first;
   }
@@ -54,9 +54,9 @@ class MergeForest {
  private:
   std::vector<Node> nodes_;
   std::vector<std::uint32_t> node_of_,
-      set_of_;                                ///< each point's least set, and the one that it is merged into
-  std::vector<std::uint32_t> members_;        ///< the points in sets, those of any one set together
-  std::vector<std::uint32_t> begin_, count_;  ///< where each node's members are
+      set_of_;                                ///< smallest set of each vertex, and the one it is merged into
+  std::vector<std::uint32_t> members_;        ///< the vertices in sets, those of each set contiguous
+  std::vector<std::uint32_t> begin_, count_;  ///< range of `members_` of each node
 };
 
 }  // namespace hermesh

@@ -1,7 +1,5 @@
 #include "algorithms/extraction/certified_collapse/merge_proof.h"
 
-#include <tbb/enumerable_thread_specific.h>
-
 #include <algorithm>
 #include <array>
 #include <atomic>
@@ -16,13 +14,13 @@ namespace {
 
 using Eigen::Vector3d;
 
-/// What the bound is at least, in voxels: what rounding makes of the distance of a triangle to itself.
+/// Least bound, voxels: rounding of the distance of a triangle to itself.
 constexpr double kLeastBound = 1e-6;
 
-/// Sets to be split are few if there is one in so many merged triangles.
+/// Sets to be split are few if there is at most one for this many merged triangles.
 constexpr std::size_t kFew = 512;
 
-/// After so many rounds of splits all sets of what fails are split, and not only the worst.
+/// Rounds of splits after which all sets at a failure are split, and not only the last one joined.
 constexpr int kPatience = 3;
 
 }  // namespace
@@ -40,7 +38,7 @@ MergeProof::MergeProof(MergeForest& forest, const FineMesh& fine, std::span<cons
   if (const auto [least, most] = std::ranges::minmax_element(tolerance_);
       least != tolerance_.end() && *least == *most)
     one_bound_ = std::max(kLeastBound, double(*least));
-  // As if nothing were merged yet: then all sets are joins that are not known.
+  // As if nothing were merged yet: all sets are joins not known so far.
   parallel_blocks(proofs_.size(), context_, [&](std::size_t t) {
     if (fine_.triangles()[t][0] != FineMesh::kNone) proofs_[t] = kStays | kOpen;
   });
@@ -49,33 +47,23 @@ MergeProof::MergeProof(MergeForest& forest, const FineMesh& fine, std::span<cons
   merged_.origin = open_;
 }
 
-const MergedMesh& MergeProof::sort_out() {
-  run(false);
-  return merged_;
-}
-
-const MergedMesh& MergeProof::prove() {
-  run(true);
-  return merged_;
-}
-
-/// Looks and splits until nothing fails; `geometry` asks for more than the topology. The tests that cost
-/// least come first, and the next ones once these have little left to say. The mesh has passed all tests in
-/// one round in the end: where none calls a set unproven, none is left out.
-void MergeProof::run(bool geometry) {
+/// Tests and splits until nothing fails; `geometry` includes the tests beyond the topology. Cheap tests come
+/// first, and the others once few of their failures are left; if none fails, none is omitted.
+const MergedMesh& MergeProof::run(bool geometry) {
   take_in_joins();
   splits_ = 0;
   do {
-    look_at_topology();
-    if (geometry) look_at_merged();
-    if (geometry && few_are_unproven()) look_at_fine();
-    if (geometry && few_are_unproven()) look_at_contacts();
-    if (geometry && few_are_unproven()) look_at_signs();
+    check_topology();
+    if (geometry) check_merged();
+    // In the same round only if few sets are to be split, and not once per handful of splits.
+    if (geometry && few_are_unproven()) check_fine();
+    if (geometry && few_are_unproven()) check_contacts();
+    if (geometry && few_are_unproven()) check_signs();
   } while (split());
+  return merged_;
 }
 
-/// Makes the mesh anew with the sets that were joined since it was made, and forgets what was proved near
-/// these.
+/// Rebuilds the mesh with the sets joined since the last call, and invalidates the proofs near these.
 void MergeProof::take_in_joins() {
   std::fill(brought_back_.begin(), brought_back_.end(), 0);
   const std::size_t known = std::exchange(known_, forest_.size());
@@ -113,7 +101,7 @@ bool MergeProof::is_single(std::uint32_t t) const {
          forest_.set_of(c[2]) == MergeForest::kNone;
 }
 
-/// Makes the merged mesh. Its points are numbered in the order of the fine ones that they go by.
+/// Builds the merged mesh. Its vertices are in the order of the fine ones that represent them.
 void MergeProof::build() {
   merged_.number.assign(fine_.points().size(), MergeForest::kNone);
   const auto for_each_corner = [&](auto&& f) {
@@ -123,7 +111,7 @@ void MergeProof::build() {
     });
   };
   for_each_corner([&](std::size_t, int, std::uint32_t leader) {
-    // Several triangles have one leader, and all of them write the same.
+    // Several triangles share a leader, and all write the same value.
     std::atomic_ref(merged_.number[leader]).store(0, std::memory_order_relaxed);
   });
   merged_.leaders.clear();
@@ -144,10 +132,9 @@ void MergeProof::build() {
   merged_.mesh.emplace(std::move(points), std::move(triangles));
 }
 
-/// Calls the set at a fine triangle's corners unproven that was joined last: before that join its merged
-/// triangle was another one, which most likely was good. (The fandisk at 400 voxels has 4 % fewer triangles
-/// so than where the set with the largest error is split, scans as many.) Whatever fails has a set to blame,
-/// so the proof goes on. Moves are taken back before anything is split that was joined.
+/// Marks as unproven the set at a fine triangle's corners that was joined last: the merged triangle before
+/// that join most likely was good. (The fandisk at 400 voxels gets 4 % fewer triangles than if the set with
+/// the largest error is split, scans as many.) Moves are undone before any other set.
 void MergeProof::call_unproven(std::uint32_t t) {
   const auto moves = [&](std::uint32_t p) {
     const std::uint32_t set = forest_.set_of(p);
@@ -164,11 +151,8 @@ void MergeProof::call_unproven(std::uint32_t t) {
   if (last != MergeForest::kNone) std::atomic_ref(unproven_[last]).store(1, std::memory_order_relaxed);
 }
 
-/// Calls sets unproven where an edge goes from one point to another twice. Every set is a disc: a block's by
-/// its Euler characteristic, two that an edge joined by the link condition. Two sets share one piece of
-/// border at most if there is no such edge; then the merged mesh is a triangulation of the same surface.
-/// (Edges of the fine mesh itself may be those of several patches.)
-void MergeProof::look_at_topology() {
+/// Marks sets as unproven at directed edges that occur twice.
+void MergeProof::check_topology() {
   const FineMesh& mesh = *merged_.mesh;
   const auto is_set = [&](std::uint32_t p) {
     return forest_.set_of(merged_.leaders[p]) != MergeForest::kNone;
@@ -186,27 +170,27 @@ void MergeProof::look_at_topology() {
   });
 }
 
-/// How near the other mesh has to be to a fine triangle, voxels: the least tolerance of its corners.
+/// Returns the largest distance of the other mesh from a fine triangle, voxels: the least tolerance of its
+/// corners.
 double MergeProof::bound(std::uint32_t fine_triangle) const {
   if (one_bound_ > 0) return one_bound_;
   const Triangle& c = fine_.triangles()[fine_triangle];
   return std::max(kLeastBound, double(std::min({tolerance_[c[0]], tolerance_[c[1]], tolerance_[c[2]]})));
 }
 
-/// Proves that fine triangles are near the merged mesh, of those that a merged triangle was laid over.
+/// Proves that fine triangles over a merged triangle are near it.
 ///
-/// **Why.** What lies over the merged triangle of a fine one is within the bound
-/// (TriangleOverlay::is_near()). So is all of it if it lies over that as a whole. If it reaches across one
-/// side alone, it is cut in two there: where its edges pass over the side they are within the bound of that,
-/// for they are over the merged triangle. The side belongs to the merged triangle beyond it, too; so if the
-/// corners beyond are within the bound of that one, the part beyond is, for the distance to a triangle is
-/// convex.
+/// **Why it holds.** The part of a fine triangle over the merged triangle is within the bound
+/// (TriangleOverlay::is_near()), so all of it is if it lies over that completely. If it reaches across one
+/// side only, it is cut in two there: where its edges pass over the side they are within the bound of that,
+/// because they are over the merged triangle. The side also belongs to the merged triangle beyond it; so if
+/// the corners beyond are within the bound of that one, the part beyond is, because the distance to a
+/// triangle is convex.
 class MergeProof::Above {
  public:
   Above(MergeProof& proof, std::uint32_t face) : proof_(proof), face_(face) {}
 
-  /// To be called for each fine triangle that is_near() looks at, with its corners seen from the merged
-  /// triangle.
+  /// Called for each fine triangle that is_near() visits, with its corners seen from the merged triangle.
   void operator()(std::uint32_t fine_triangle, const Places& places) {
     if (proof_.proofs_of(fine_triangle) & kCovered) return;
     int out = -1;
@@ -215,7 +199,7 @@ class MergeProof::Above {
       if (out >= 0) return;
       out = side;
     }
-    // Only what rests on merged triangles that forget_covered() finds again is kept.
+    // Only proofs that forget_covered() finds are reused.
     const std::array<std::uint32_t, 3> leaders = proof_.leaders(fine_triangle);
     if (!proof_.touches(face_, leaders) || (out >= 0 && !is_near_beyond(fine_triangle, places, out, leaders)))
       return;
@@ -237,20 +221,18 @@ class MergeProof::Above {
   }
 
   MergeProof& proof_;
-  const std::uint32_t face_;  ///< of the merged mesh
-  std::array<std::optional<TriangleReach>, 3>
-      beyond_;  ///< the merged triangles across its sides, once they are asked for
+  const std::uint32_t face_;                            ///< of the merged mesh
+  std::array<std::optional<TriangleReach>, 3> beyond_;  ///< the merged triangles across its sides, on demand
 };
 
-/// Proves that merged triangles are near the fine mesh. That mesh does not change, so neither does the proof.
-/// Most fine triangles turn out to be near a merged one.
-void MergeProof::look_at_merged() {
+/// Proves that merged triangles are near the fine mesh, and on the way that most fine triangles are covered.
+void MergeProof::check_merged() {
   any_covered_ = true;
   parallel_blocks(merged_.origin.size(), context_, [&](std::size_t i) {
     const std::uint32_t t = merged_.origin[i];
     if (proofs_of(t) & kNear) return;
     const auto face = static_cast<std::uint32_t>(i);
-    // A triangle that stays as it was is near itself.
+    // An unchanged triangle is near itself.
     if (is_single(t) || DistanceCertificate(fine_, overlays_.local())
                             .holds(
                                 merged_.mesh->corners(face), t, [&](std::uint32_t f) { return bound(f); },
@@ -261,12 +243,12 @@ void MergeProof::look_at_merged() {
   });
 }
 
-/// The points that the sets at a fine triangle's corners go by.
+/// Returns the leaders of a fine triangle's corners.
 std::array<std::uint32_t, 3> MergeProof::leaders(std::uint32_t t) const {
   const Triangle& c = fine_.triangles()[t];
   return {forest_.leader(c[0]), forest_.leader(c[1]), forest_.leader(c[2])};
 }
-/// Whether a corner of the face goes by one of the points.
+/// Returns true if a corner of the face has one of the leaders.
 bool MergeProof::touches(std::uint32_t face, const std::array<std::uint32_t, 3>& leaders) const {
   for (const std::uint32_t p : merged_.mesh->triangles()[face]) {
     const std::uint32_t leader = merged_.leaders[p];
@@ -274,7 +256,7 @@ bool MergeProof::touches(std::uint32_t face, const std::array<std::uint32_t, 3>&
   }
   return false;
 }
-/// Whether a corner of the face goes by one of the points or is next to one that does.
+/// Returns true if a corner of the face has one of the leaders or is adjacent to one that does.
 bool MergeProof::is_known(std::uint32_t face, const std::array<std::uint32_t, 3>& leaders) const {
   if (touches(face, leaders)) return true;
   for (const std::uint32_t p : merged_.mesh->triangles()[face])
@@ -284,31 +266,29 @@ bool MergeProof::is_known(std::uint32_t face, const std::array<std::uint32_t, 3>
 }
 
 /// Proves that fine triangles are near the merged mesh.
-void MergeProof::look_at_fine() {
+void MergeProof::check_fine() {
   const FineMesh& mesh = *merged_.mesh;
   parallel_blocks(open_.size(), context_, [&](std::size_t i) {
     const std::uint32_t t = open_[i];
     if (proofs_of(t) & kCovered) return;
     if (is_single(t)) return mark_proved(t, kCovered);
     const std::array<std::uint32_t, 3> leaders = this->leaders(t);
-    // Not from a single point, which may be one of other patches too.
+    // Not from a single vertex, which may belong to other patches too.
     int in_set = 0;
     while (forest_.set_of(fine_.triangles()[t][in_set]) == MergeForest::kNone) ++in_set;
     const std::uint32_t point = merged_.number[leaders[in_set]];
-    if (point == MergeForest::kNone) return call_unproven(t);  // all that hangs together here has vanished
-    // The proof is kept only if it rests on triangles that forget_covered() finds again when one of them
-    // changes.
-    bool known = true;
+    if (point == MergeForest::kNone) return call_unproven(t);  // the component has vanished
+    bool known = true, touched = true;  // true if forget_covered() finds all faces, and as kCovered
     const double within = bound(t);
-    bool touched = true;
-    const auto hear = [&](std::uint32_t face) {
+    const auto bound_of = [&](std::uint32_t face) {
       if (touches(face, leaders)) return within;
       touched = false;
       known = known && is_known(face, leaders);
       return within;
     };
     if (!DistanceCertificate(mesh, overlays_.local())
-             .holds(fine_.corners(t), mesh.around(point).front(), hear, [](std::uint32_t, const Places&) {}))
+             .holds(fine_.corners(t), mesh.around(point).front(), bound_of,
+                    [](std::uint32_t, const Places&) {}))
       call_unproven(t);
     else if (known)
       mark_proved(t, touched ? kCovered : Proof(kCovered | kFar));
@@ -320,7 +300,7 @@ void MergeProof::look_at_fine() {
   });
 }
 
-// Several merged triangles may cover one fine triangle.
+// Atomic, because several merged triangles may cover one fine triangle.
 std::uint8_t MergeProof::proofs_of(std::uint32_t t) {
   return std::atomic_ref(proofs_[t]).load(std::memory_order_relaxed);
 }
@@ -329,7 +309,7 @@ void MergeProof::mark_proved(std::uint32_t t, Proof what) {
 }
 
 /// Tests pairs of merged triangles of which one has changed.
-void MergeProof::look_at_contacts() {
+void MergeProof::check_contacts() {
   const FineMesh& mesh = *merged_.mesh;
   const std::size_t n = mesh.triangles().size();
   std::vector<Bounds> boxes(n);
@@ -339,22 +319,22 @@ void MergeProof::look_at_contacts() {
   const auto is_new = [&](std::uint32_t t) { return !(proofs_[merged_.origin[t]] & kApart); };
   parallel_blocks(n, context_, [&](std::size_t i) {
     const auto t = static_cast<std::uint32_t>(i);
-    // Of two triangles of different levels the smaller one asks; of one level a new one, of two new ones the
-    // first.
+    // Each pair once: from the triangle of the smaller level; at equal levels from a new one, of two new ones
+    // from the first.
     grid.visit(t, grid.level(t) + !is_new(t), [&](std::uint32_t u) {
-      const bool asks = grid.level(u) > grid.level(t) ? is_new(t) || is_new(u) : !is_new(u) || t < u;
-      if (u == t || !asks || !boxes[t].overlaps(boxes[u])) return;
+      const bool tests = grid.level(u) > grid.level(t) ? is_new(t) || is_new(u) : !is_new(u) || t < u;
+      if (u == t || !tests || !boxes[t].overlaps(boxes[u])) return;
       if (certainly_apart(mesh.triangles()[t], mesh.triangles()[u], mesh.points())) return;
       call_unproven(merged_.origin[t]);
       call_unproven(merged_.origin[u]);
     });
   });
-  // Those that did meet have an unproven set, and lose the mark when it is split.
+  // Triangles that intersect have an unproven set, and lose the mark when it is split.
   for (const std::uint32_t t : merged_.origin) proofs_[t] |= kApart;
 }
 
-/// Calls sets unproven in shells that are inside out.
-void MergeProof::look_at_signs() {
+/// Marks sets as unproven in shells that are inside out.
+void MergeProof::check_signs() {
   const std::vector<std::uint8_t> reversed =
       shells_.changed(merged_.mesh->points(), merged_.mesh->triangles(), merged_.origin);
   if (std::ranges::find(reversed, 1) == reversed.end()) return;
@@ -362,37 +342,29 @@ void MergeProof::look_at_signs() {
     if (shells_.is_in(reversed, t)) call_unproven(t);
 }
 
-/// Whether so few sets are to be split that the other tests can be had in the same round, and not one after a
-/// split for every handful.
 bool MergeProof::few_are_unproven() const {
   return kFew * static_cast<std::size_t>(std::ranges::count(unproven_, 1)) <= merged_.origin.size();
 }
 
-std::vector<std::uint32_t> MergeProof::unproven_sets() const {
-  std::vector<std::uint32_t> sets;
-  for (std::uint32_t s = 0; s < unproven_.size(); ++s)
-    if (unproven_[s]) sets.push_back(s);
-  return sets;
-}
-
-/// Splits the unproven sets and makes the mesh anew; false if there is nothing to split. A merged triangle
-/// stays when its sets become smaller, and others come anew.
+/// Splits the unproven sets and rebuilds the mesh; false if there are none. A merged triangle stays when its
+/// sets become smaller, and others appear.
 bool MergeProof::split() {
-  const std::vector<std::uint32_t> sets = unproven_sets();
-  if (sets.empty()) return false;
-  ++splits_;
   std::vector<std::uint32_t> changed;
-  for (const std::uint32_t set : sets) {
-    unproven_[set] = 0;
+  bool any = false;
+  for (std::uint32_t set = 0; set < unproven_.size(); ++set) {
+    if (!std::exchange(unproven_[set], 0)) continue;
+    any = true;
     forest_.split(set);
     const auto members = forest_.members(set);
     changed.insert(changed.end(), members.begin(), members.end());
   }
+  if (!any) return false;
+  ++splits_;
   const std::size_t stayed = merged_.origin.size();
   for (const std::uint32_t p : changed)
     for (const std::uint32_t t : fine_.around(p)) {
-      // A triangle with a corner in a set that was split may have moved: only that it stays, and what
-      // forget_covered() looks after, is kept.
+      // A triangle with a corner in a split set may have moved: only that it stays, and the facts that
+      // forget_covered() handles, are preserved.
       const bool new_one = !(proofs_[t] & kStays) && stays(t);
       if (new_one) merged_.origin.push_back(t);
       proofs_[t] = (proofs_[t] & (kStays | kCovered | kFar | kOpen)) | (new_one ? kStays : 0);
@@ -406,11 +378,9 @@ bool MergeProof::split() {
   return true;
 }
 
-/// Takes back the proofs of fine triangles that may rest on merged triangles that have changed. Such a proof
-/// rests on merged triangles that have one of the fine triangle's sets for a corner, or (kFar) a set next to
-/// one of those. If such a triangle changes, one of its corners was split or joined; its other corners are
-/// next to a part of that, or to what it is a part of now. (A proof that rests on others yet is never marked,
-/// and so asked for again each time.)
+/// Invalidates the proofs of fine triangles that may rest on changed merged triangles. If a merged triangle
+/// changes, one of its corners was split or joined; its other corners are adjacent to a part of that, or to
+/// the set that it is part of now.
 void MergeProof::forget_covered(const std::vector<std::uint32_t>& changed) {
   const FineMesh& mesh = *merged_.mesh;
   std::vector<std::uint8_t> found(mesh.points().size());

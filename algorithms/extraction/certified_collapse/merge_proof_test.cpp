@@ -11,7 +11,7 @@
 #include "algorithms/extraction/certified_collapse/distance_certificate.h"
 
 namespace hermesh {
-namespace {
+namespace merge_proof_test {
 
 using Eigen::Vector3d;
 
@@ -162,7 +162,8 @@ FineMesh rough_torus(int n, double rough, std::mt19937& random) {
   return FineMesh(std::move(points), smooth.triangles());
 }
 
-/// The largest distance from places on one mesh to another, each found by looking at all triangles of that.
+/// Returns the largest distance from points on one mesh to another, each found by comparison with all
+/// triangles of the other.
 double largest_distance(const FineMesh& from, const FineMesh& to) {
   double largest = 0;
   for (std::uint32_t t = 0; t < from.triangles().size(); ++t) {
@@ -181,9 +182,9 @@ double largest_distance(const FineMesh& from, const FineMesh& to) {
   return largest;
 }
 
-/// Sets of two by two points on a rough torus: fine triangles reach across the sides of merged ones
+/// Sets of two by two vertices on a rough torus: fine triangles extend across the sides of merged ones
 /// everywhere, and roughness puts some of them beyond the tolerance there. More sets are joined, and the
-/// proof asked again, which keeps what it knows.
+/// proof is repeated, reusing its previous results.
 TEST(MergeProof, PromisesNothingThatSamplesContradict) {
   std::mt19937 random(3);
   constexpr int kSide = 16;
@@ -211,7 +212,7 @@ TEST(MergeProof, PromisesNothingThatSamplesContradict) {
     EXPECT_LT(before, fine.points().size()) << rough;
     EXPECT_LE(largest_distance(*proof.merged().mesh, fine), within + kDistanceSlack) << rough;
     EXPECT_LE(largest_distance(fine, *proof.merged().mesh), within + kDistanceSlack) << rough;
-    // Every tenth edge of the mesh, where both ends still stand.
+    // Every tenth edge of the mesh, if both of its ends still exist.
     std::vector<std::uint8_t> used(fine.points().size());
     for (std::uint32_t t = 0; t < proof.merged().mesh->triangles().size(); t += 10) {
       const Triangle& c = proof.merged().mesh->triangles()[t];
@@ -300,5 +301,5 @@ TEST(DistanceCertificate, SeesAPointThatIsTooFarAway) {
   }
 }
 
-}  // namespace
+}  // namespace merge_proof_test
 }  // namespace hermesh

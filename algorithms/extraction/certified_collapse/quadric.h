@@ -9,7 +9,7 @@
 
 namespace hermesh {
 
-/// A quadric relative to an anchor that its owner keeps, so that single precision is enough. Voxels, weights
+/// A quadric relative to an anchor that its owner stores, so that single precision is enough. Voxels, weights
 /// in square voxels.
 struct PlaneQuadric {
   Eigen::Matrix<float, 6, 1> a = Eigen::Matrix<float, 6, 1>::Zero();  ///< xx xy xz yy yz zz
@@ -25,8 +25,8 @@ struct PlaneQuadric {
   }
 };
 
-/// The quadric of the triangles around a point of a fine mesh, about that point; each triangle gives a third
-/// of its area to each of its corners.
+/// Returns the quadric of the triangles around a vertex of a fine mesh, about that vertex; each triangle
+/// gives a third of its area to each corner.
 inline PlaneQuadric quadric_at(const FineMesh& fine, std::uint32_t point) {
   PlaneQuadric quadric;
   for (const std::uint32_t t : fine.around(point)) {
@@ -38,18 +38,17 @@ inline PlaneQuadric quadric_at(const FineMesh& fine, std::uint32_t point) {
   return quadric;
 }
 
-/// How strongly a minimiser is drawn to the middle of what it stands for, against the planes: enough to
-/// decide on a plane.
+/// Weight of the pull of a minimiser towards its anchor relative to the planes: enough to decide on a plane.
 inline constexpr double kPull = 1e-6;
 
-/// A quadric in double precision about any anchor, for one decision. The trace of `a` is the sum of the
-/// weights, for normals are of unit length: the quadric over the trace is a mean squared distance.
+/// A quadric in double precision about any anchor. The trace of `a` is the sum of the weights, because
+/// normals have unit length: the quadric over the trace is a mean squared distance.
 struct WideQuadric {
   Eigen::Matrix3d a = Eigen::Matrix3d::Zero();
   Eigen::Vector3d b = Eigen::Vector3d::Zero();
   double c = 0;
 
-  /// Adds q, which is about a place that lies `shift` from this one's anchor.
+  /// Adds q, whose anchor lies `shift` from this one's.
   void add(const PlaneQuadric& q, const Eigen::Vector3d& shift) {
     Eigen::Matrix3d m;
     m << q.a[0], q.a[1], q.a[2], q.a[1], q.a[3], q.a[4], q.a[2], q.a[4], q.a[5];
@@ -65,7 +64,7 @@ struct WideQuadric {
     c += weight * offset * offset;
   }
   double operator()(const Eigen::Vector3d& x) const { return std::max(0.0, x.dot(a * x) + 2 * b.dot(x) + c); }
-  /// The quadric about a place, given from the anchor.
+  /// Returns the quadric about a position relative to the anchor.
   PlaneQuadric about(const Eigen::Vector3d& x) const {
     PlaneQuadric q;
     q.a << float(a(0, 0)), float(a(0, 1)), float(a(0, 2)), float(a(1, 1)), float(a(1, 2)), float(a(2, 2));
@@ -73,8 +72,8 @@ struct WideQuadric {
     q.c = static_cast<float>((*this)(x));
     return q;
   }
-  /// Minimiser of the quadric and a weak pull (kPull of its trace) towards the anchor, which decides where
-  /// planes do not.
+  /// Returns the minimiser of the quadric and a weak pull (kPull of its trace) towards the anchor, which
+  /// decides where planes do not.
   Eigen::Vector3d minimiser() const {
     const double weight = kPull * a.trace() + 1e-12;
     return (a + weight * Eigen::Matrix3d::Identity()).ldlt().solve(-b);

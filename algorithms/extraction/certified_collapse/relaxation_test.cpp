@@ -1,5 +1,3 @@
-#include "algorithms/extraction/certified_collapse/relaxation.h"
-
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>
 
@@ -8,14 +6,15 @@
 #include <cmath>
 
 #include "algorithms/extraction/certified_collapse/certified_decimation.h"
+#include "algorithms/extraction/certified_collapse/merge_proposals.h"
 #include "algorithms/search/triangle_tree.h"
 
 namespace hermesh {
-namespace {
+namespace relaxation_test {
 
 using Eigen::Vector3d;
 
-/// A sphere of the radius, about the origin: the faces of a cube of n³ cells, projected.
+/// A sphere about the origin: the faces of a box of n³ cells, projected.
 FineMesh sphere(int n, double radius) {
   std::vector<Vector3d> points;
   std::vector<Triangle> triangles;
@@ -48,7 +47,7 @@ FineMesh sphere(int n, double radius) {
   return FineMesh(std::move(points), std::move(triangles));
 }
 
-/// A forest that moves one point to a place and leaves all others.
+/// A forest that moves one vertex.
 MergeForest one_move(const FineMesh& fine, std::uint32_t point, const Vector3d& place) {
   MergeForest forest({}, std::vector<std::uint32_t>(fine.points().size(), MergeForest::kNone));
   forest.join(point, {.first = point, .merges = true, .moves = true, .place = place, .quadric = {}});
@@ -56,17 +55,23 @@ MergeForest one_move(const FineMesh& fine, std::uint32_t point, const Vector3d& 
   return forest;
 }
 
-/// Root mean square distance of fine points to a coarse mesh, by all of its triangles.
-double rms(const FineMesh& fine, const CertifiedMesh& coarse) {
-  double sum = 0;
+/// Distances of the vertices of a fine mesh from a coarse one, by all of its triangles.
+std::vector<double> distances(const FineMesh& fine, const CertifiedMesh& coarse) {
+  std::vector<double> result;
   for (const Vector3d& p : fine.points()) {
     double least = 1e300;
     for (const Triangle& t : coarse.triangles)
       least =
           std::min(least, squared_distance(p, coarse.points[t[0]], coarse.points[t[1]], coarse.points[t[2]]));
-    sum += least;
+    result.push_back(std::sqrt(least));
   }
-  return std::sqrt(sum / double(fine.points().size()));
+  return result;
+}
+
+double rms(const std::vector<double>& values) {
+  double sum = 0;
+  for (const double x : values) sum += x * x;
+  return std::sqrt(sum / double(values.size()));
 }
 
 CertifiedMesh decimated(const FineMesh& fine, float tolerance, const Nearness& nearness) {
@@ -84,9 +89,10 @@ TEST(Relaxation, BringsAPointBackThatWasMovedOff) {
   const Vector3d home = fine.points()[100];
   MergeForest forest = one_move(fine, 100, 1.02 * home);
   MergeProof proof(forest, fine, tolerance, context);
-  propose_relaxation(forest, proof.prove(), fine, tolerance, pinned, 4, FilePoints(IndexToWorld()), context);
-  // With all others in their places the sum of squares is 0 where the point came from, 0.4 below; along the
-  // sphere, where it hardly grows, the point may be elsewhere.
+  const FilePoints file{IndexToWorld()};
+  propose_relaxation(forest, proof.prove(), {fine, tolerance, pinned, 0.0, file}, 4, context);
+  // With all others unmoved the sum of squares is 0 at the vertex's origin, 0.4 below; along the sphere,
+  // where it hardly grows, the vertex may be elsewhere.
   const Vector3d& place = forest.node(forest.set_of(100)).place;
   EXPECT_NEAR(place.norm(), 20.0, 0.01);
   EXPECT_NEAR((place - home).norm(), 0.0, 0.05);
@@ -115,15 +121,9 @@ TEST(Relaxation, ASphereIsNearerByAFourthWithItsTriangles) {
   const FineMesh fine = sphere(40, 25.0);
   const CertifiedMesh before = decimated(fine, 0.3f, {}), after = decimated(fine, 0.3f, {.relaxation = 3});
   EXPECT_LT(after.triangles.size(), 1.01 * double(before.triangles.size()));
-  EXPECT_LT(rms(fine, after), 0.75 * rms(fine, before));
-  // The fine points are no farther away than the bound and its slack.
-  for (const Vector3d& p : fine.points()) {
-    double least = 1e300;
-    for (const Triangle& t : after.triangles)
-      least =
-          std::min(least, squared_distance(p, after.points[t[0]], after.points[t[1]], after.points[t[2]]));
-    EXPECT_LE(std::sqrt(least), 0.305);
-  }
+  const std::vector<double> apart = distances(fine, after);
+  EXPECT_LT(rms(apart), 0.75 * rms(distances(fine, before)));
+  for (const double d : apart) EXPECT_LE(d, 0.305);  // the bound and its slack
 }
 
 TEST(Relaxation, AGreaterMomentGivesFewerTriangles) {
@@ -134,7 +134,7 @@ TEST(Relaxation, AGreaterMomentGivesFewerTriangles) {
   EXPECT_LT(all, few);
   EXPECT_LT(few, many);
   EXPECT_LT(many, fine.triangles().size());
-  // Any collapse costs less, so that the tolerance alone says how far they go.
+  // Any collapse costs less, so only the tolerance limits them.
   EXPECT_LT(decimated(fine, 2.0f, {.moment = 1e6}).triangles.size(), few);
 }
 
@@ -148,9 +148,9 @@ TEST(Relaxation, EndsWhenTheWorkIsCancelled) {
   const MergedMesh& merged = proof.prove();
   const std::atomic<bool> cancel = true;
   context.cancel = &cancel;
-  EXPECT_THROW(
-      propose_relaxation(forest, merged, fine, tolerance, pinned, 1, FilePoints(IndexToWorld()), context),
-      Cancelled);
+  const FilePoints file{IndexToWorld()};
+  EXPECT_THROW(propose_relaxation(forest, merged, {fine, tolerance, pinned, 0.0, file}, 1, context),
+               Cancelled);
 }
 
 TEST(Relaxation, SameBytesAtAnyThreadCount) {
@@ -166,5 +166,5 @@ TEST(Relaxation, SameBytesAtAnyThreadCount) {
   }
 }
 
-}  // namespace
+}  // namespace relaxation_test
 }  // namespace hermesh

@@ -1,4 +1,4 @@
-// The closed shells of a fine mesh, and what becomes of their volumes when points are merged.
+// The closed shells of a fine mesh, and the change of their volumes when vertices are merged.
 #pragma once
 
 #include <Eigen/Core>
@@ -15,29 +15,27 @@ namespace hermesh {
 /// The pieces behind and in front of a triangle; 0 is the outside.
 using TrianglePieces = std::array<std::uint32_t, 2>;
 
-/// The shells of a fine mesh, which are the connected components of the boundary of each piece, and their
-/// volumes.
+/// The shells of a fine mesh, i.e. the connected components of the boundary of each piece, and their volumes.
 ///
-/// **Why volumes.** A shell that is closed, connected and free of self-intersection encloses one region, and
-/// its signed volume is plus or minus the volume of that region: plus if it faces outwards. Freedom from
+/// **Why volumes.** A shell that is closed, connected and free of self-intersection encloses one body, and
+/// its signed volume is plus or minus the volume of that body: plus if it faces outwards. Freedom from
 /// self-intersection and nearness do not imply the sign, because a shell as small as the tolerance can be
 /// merged into its mirror image.
 class ShellVolumes {
  public:
   /// @param fine closed and oriented, or a complex of patches; shells with a border are left out
-  /// @param pieces of each triangle of a complex; empty if all triangles have piece 1 behind them and 0 in
-  ///   front
+  /// @param pieces of each triangle of a complex; empty if all triangles have piece 1 behind and 0 in front
   ShellVolumes(const FineMesh& fine, std::span<const TrianglePieces> pieces);
 
-  /// Returns for each shell whether its volume has another sign than in the fine mesh, or differs from that
-  /// by more than the share `most_change` of it.
+  /// Returns a flag for each shell: 1 if its volume has another sign than in the fine mesh, or differs from
+  /// that by more than the share `most_change` of it.
   /// @param points, triangles of a mesh that was merged from the fine one
   /// @param origin for each triangle one of the fine mesh, whose corners went into the corners of this one
   std::vector<std::uint8_t> changed(std::span<const Eigen::Vector3d> points,
                                     std::span<const Triangle> triangles,
                                     std::span<const std::uint32_t> origin,
                                     double most_change = std::numeric_limits<double>::infinity()) const;
-  /// Returns whether a fine triangle belongs to one of the shells with a flag.
+  /// Returns true if a fine triangle belongs to one of the shells with a flag.
   bool is_in(const std::vector<std::uint8_t>& shells, std::uint32_t fine_triangle) const {
     const auto [behind, in_front] = shells_of(fine_triangle);
     return (behind != kNone && shells[behind]) || (in_front != kNone && shells[in_front]);

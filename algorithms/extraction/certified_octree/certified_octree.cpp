@@ -27,7 +27,8 @@ CertifiedPolygons by_regions(const HermiteView& grid, const CertifiedOctreeOptio
   UniformCells uniform(grid, options.uniform, file, context);
   const RegionOptions asked{cell_tolerances(uniform.cells(), field, options.tolerance, context),
                             options.flatness, options.largest_cube};
-  // Caps may hold a mean off the hull of crossings whose samples were mirrored and rounded (volume_ends.h).
+  // Caps may keep a mean outside of the hull of crossings whose samples were mirrored and rounded
+  // (volume_ends.h).
   const Bounds& caps = options.uniform.caps;
   const bool has_caps = caps.lower.array().isFinite().any() || caps.upper.array().isFinite().any();
   const bool in_hulls = options.uniform.placement == DualContouringOptions::Placement::average && !has_caps;
@@ -58,7 +59,7 @@ PolygonMesh certified_octree(const HermiteView& grid, const CertifiedOctreeOptio
 
 namespace {
 
-/// The options that the octree has beyond those of all certified extractors.
+/// The options of the octree in addition to those of all certified extractors.
 const OptionTable<CertifiedOctreeOptions>& octree_option_table() {
   using Options = CertifiedOctreeOptions;
   static const auto table =

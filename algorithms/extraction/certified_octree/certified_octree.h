@@ -1,5 +1,5 @@
 // Adaptive contouring with the guarantees of `manifold-dual-contouring`, many times as fast and with more
-// polygons: cubes of 2³, 4³ and 8³ cells become one point each, as an octree does, and points stay within
+// polygons: cubes of 2³, 4³ and 8³ cells become one vertex each, as in an octree, and vertices stay within
 // their cells.
 #pragma once
 
@@ -14,19 +14,19 @@ struct CertifiedOctreeOptions {
   /// Bound of the two-sided distance between the mesh and the uniform one, in voxels: larger gives fewer
   /// polygons. 0 gives the uniform mesh itself.
   double tolerance = 0.1;
-  double flatness = 0;   ///< how far a cube's point may be from its planes (RegionOptions), in voxels
-  int largest_cube = 8;  ///< cells a side: 2, 4 or 8
+  double flatness = 0;   ///< largest distance of a cube's vertex from its planes (RegionOptions), in voxels
+  int largest_cube = 8;  ///< cells per side: 2, 4 or 8
   DualContouringOptions
-      uniform;  ///< placement of the uniform mesh's points, whose `reach` is 0 whatever it says
+      uniform;  ///< placement of the uniform mesh's vertices, whose `reach` is always treated as 0
 };
 
-/// Uniform mesh within its cells (uniform_mesh.h), then cubes of cells merged of which those stay that are
-/// proved to keep the topology, the freedom from self-intersection and the bound (region_mesh.h). The same
-/// bytes for every number of threads. The field means what it means to manifold_dual_contouring().
+/// Computes the uniform mesh within its cells (uniform_mesh.h), then merges cubes of cells that are proved to
+/// preserve the topology, the freedom from self-intersection and the bound (region_mesh.h). The result is
+/// identical for any number of threads. The field has the same meaning as for manifold_dual_contouring().
 PolygonMesh certified_octree(const HermiteView& grid, const CertifiedOctreeOptions& options,
                              const AdaptivityField* field, RunContext& context);
 
-/// The table's entry.
+/// Implements the table's entry.
 PolygonMesh certified_octree(const ExtractionInput& input);
 std::vector<OptionSpec> certified_octree_options();
 

@@ -13,9 +13,9 @@
 namespace hermesh {
 namespace {
 
-constexpr double kWidth = 8;  ///< how wide the cubes of the lattice are, voxels
+constexpr double kWidth = 8;  ///< width of the cubes of the lattice, voxels
 
-/// The number of a cube; two far apart may have the same, which costs time alone.
+/// Returns the key of a cube; two distant cubes may have the same key, which only costs time.
 std::uint64_t number_of(const std::array<std::int64_t, 3>& cube) {
   constexpr int kBits = 21;
   const auto part = [](std::int64_t x) {
@@ -28,7 +28,7 @@ std::array<std::int64_t, 3> cube_at(const Eigen::Vector3d& place) {
   return {index(0), index(1), index(2)};
 }
 
-/// Calls f(number) for the cubes that a box touches.
+/// Calls f(key) for the cubes that a box overlaps.
 template <class F>
 void for_each_place(const Bounds& box, F&& f) {
   const std::array<std::int64_t, 3> first = cube_at(box.lower), last = cube_at(box.upper);
@@ -39,19 +39,19 @@ void for_each_place(const Bounds& box, F&& f) {
 
 Bounds box_of(const NamedPolygon& polygon) {
   Bounds box;
-  for (int i = 0; i < polygon.corners; ++i) box.add(polygon.points[static_cast<std::size_t>(i)]);
+  for (int i = 0; i < polygon.corners; ++i) box.add(polygon.points[i]);
   return box;
 }
 
-/// A triangle of a polygon, of the polygon's first corner and two that follow, with which of its corners are
-/// settled.
+/// A triangle of a polygon, of the polygon's first corner and two consecutive ones, with a flag for each of
+/// its corners that is settled.
 struct Half {
   NamedTriangle triangle;
   std::array<bool, 3> settled;
   Bounds box;
-  Half(const NamedPolygon& polygon, int half) {
-    const std::array<std::size_t, 3> corners = {0, static_cast<std::size_t>(half + 1),
-                                                static_cast<std::size_t>(half + 2)};
+  Half(const NamedPolygon& polygon, int which) {
+    const std::array<std::size_t, 3> corners = {0, static_cast<std::size_t>(which + 1),
+                                                static_cast<std::size_t>(which + 2)};
     for (std::size_t i = 0; i < 3; ++i) {
       triangle.names[i] = polygon.names[corners[i]];
       triangle.corners[i] = polygon.points[corners[i]];
@@ -62,7 +62,7 @@ struct Half {
 };
 int halves(const NamedPolygon& polygon) { return polygon.corners - 2; }
 
-/// Whether two triangles have a corner in common around which none meet.
+/// Returns true if two triangles have a common corner around which no triangles intersect.
 bool share_settled(const Half& a, const Half& b) {
   for (std::size_t i = 0; i < 3; ++i)
     if (a.settled[i] && std::ranges::find(b.triangle.names, a.triangle.names[i]) != b.triangle.names.end())
@@ -70,15 +70,15 @@ bool share_settled(const Half& a, const Half& b) {
   return false;
 }
 
-/// Whether a triangle has both ends of a quad's diagonal. The triangles of two quads that have one diagonal
-/// would not meet, but be four at an edge.
+/// Returns true if a triangle has both ends of a quad's diagonal. The triangles of two quads with a common
+/// diagonal would not intersect, but there would be four at one edge.
 bool has_diagonal(const Half& t, const NamedPolygon& polygon) {
   const Triangle& names = t.triangle.names;
   return polygon.corners == 4 &&
          std::ranges::count(names, polygon.names[0]) + std::ranges::count(names, polygon.names[2]) == 2;
 }
 
-// Cheap questions first: the exact test is only for triangles whose boxes overlap.
+// Cheap tests first: the exact test is only for triangles whose boxes overlap.
 bool may_meet(const Half& a, const Half& b) {
   return a.box.overlaps(b.box) && !share_settled(a, b) && !certainly_apart(a.triangle, b.triangle);
 }
@@ -97,7 +97,7 @@ bool may_meet(const NamedPolygon& a, const NamedPolygon& b) {
 }  // namespace
 
 LoosePolygons::ByPlace::ByPlace(std::span<const Bounds> boxes, const RunContext& context) {
-  // Count, scan, fill, and a sort that makes one order of them, whoever was first.
+  // Count, scan, fill, and sort, so that the order does not depend on the thread schedule.
   std::vector<std::uint64_t> starts(boxes.size());
   parallel_blocks(boxes.size(), context,
                   [&](std::size_t i) { for_each_place(boxes[i], [&](std::uint64_t) { ++starts[i]; }); });
@@ -119,7 +119,7 @@ LoosePolygons::ByPlace::ByPlace(std::span<const Bounds> boxes, const RunContext&
   }
 }
 
-/// The slot where a place is, or would be.
+/// Returns the slot of a cube, or the free slot for it.
 std::size_t LoosePolygons::ByPlace::slot_of(std::uint64_t place) const {
   std::uint64_t slot = (place * 0x9e3779b97f4a7c15u) >> 32;
   for (;; ++slot) {
@@ -146,9 +146,9 @@ LoosePolygons::LoosePolygons(LargeArray<NamedPolygon> tested, const RunContext& 
       by_place_(boxes_, context),
       meets_(polygons_.size()) {}
 
-/// Tested polygons near a box, with boxes relative to its lower corner: in single precision, and widened by
-/// more than that rounds. By coordinates and not by polygons, so that the compiler can compare several at
-/// once.
+/// Tested polygons near a box, with boxes relative to its lower corner, in single precision and widened by
+/// more than the rounding error. Stored by coordinate and not by polygon, so that the compiler can compare
+/// several at once.
 struct LoosePolygons::Near {
   std::vector<std::uint32_t> polygons;
   std::array<std::vector<float>, 3> lower, upper;
@@ -169,7 +169,7 @@ struct LoosePolygons::Near {
       upper[a].push_back(static_cast<float>(box.upper[axis] - origin[axis]) + kRounding);
     }
   }
-  /// Calls f(polygon) for those whose boxes overlap one.
+  /// Calls f(polygon) for those whose boxes overlap the given one.
   template <class F>
   void for_each_at(const Bounds& box, F&& f) {
     const Eigen::Vector3f from = (box.lower - origin).cast<float>(), to = (box.upper - origin).cast<float>();
@@ -178,8 +178,8 @@ struct LoosePolygons::Near {
     const float *x0 = lower[0].data(), *y0 = lower[1].data(), *z0 = lower[2].data(), *x1 = upper[0].data(),
                 *y1 = upper[1].data(), *z1 = upper[2].data();
     std::uint8_t* const out = overlap.data();
-    // Comparisons without branches, and apart from the calls: so the compiler can make vector code of them.
-    // What is done about each comes after.
+    // Comparisons without branches, separate from the calls, so that the compiler can vectorise them. The
+    // calls follow.
     for (std::size_t i = 0; i < n; ++i)
       out[i] = (x0[i] <= to[0]) & (x1[i] >= from[0]) & (y0[i] <= to[1]) & (y1[i] >= from[1]) &
                (z0[i] <= to[2]) & (z1[i] >= from[2]);
@@ -195,8 +195,8 @@ void LoosePolygons::find_near(const Bounds& box, Near& near) const {
   // Relative to the box: single precision is enough for the few voxels around.
   near.begin(box.lower);
   by_place_.for_each_near(box, [&](std::uint32_t polygon, std::uint64_t place) {
-    // A pair may share several cubes of the lattice.
-    // Once: where what they have in common begins.
+    // A pair may share several cubes of the lattice. It is reported once: for the cube where the common part
+    // of their boxes begins.
     if (box.overlaps(boxes_[polygon]) &&
         place == number_of(cube_at(box.lower.cwiseMax(boxes_[polygon].lower))))
       near.add(polygon, boxes_[polygon]);
@@ -205,20 +205,20 @@ void LoosePolygons::find_near(const Bounds& box, Near& near) const {
 
 void LoosePolygons::test_against(std::span<const NamedPolygon> polygons) {
   if (polygons.empty()) return;
-  // All polygons of a lot are near one another, so what is near any of them is looked up once.
+  // The polygons of a batch are near one another, so the polygons near any of them are collected once.
   thread_local Near near;
   Bounds all;
   for (const NamedPolygon& polygon : polygons)
-    for (int i = 0; i < polygon.corners; ++i) all.add(polygon.points[static_cast<std::size_t>(i)]);
+    for (int i = 0; i < polygon.corners; ++i) all.add(polygon.points[i]);
   find_near(all, near);
   for (const NamedPolygon& polygon : polygons)
     near.for_each_at(box_of(polygon), [&](std::uint32_t i) {
-      // Several threads may find the same polygon; all that they write is 1, so the order does not matter.
+      // Several threads may find the same polygon; all of them write 1, so the order does not matter.
       const std::atomic_ref answer(meets_[i]);
       if (answer.load(std::memory_order_relaxed)) return;
-      // Names tell a polygon among those around from the one that is tested.
+      // The names identify the tested polygon among the given ones.
       const bool is_itself = polygons_[i].name == polygon.name;
-      // A quad is tested against itself, too: its halves share the diagonal, and may be folded onto one
+      // A quad is also tested against itself: its halves share the diagonal, and may be folded onto one
       // another.
       if (is_itself ? halves(polygon) == 2 && may_meet(Half(polygon, 0), Half(polygon, 1))
                     : may_meet(polygon, polygons_[i]))

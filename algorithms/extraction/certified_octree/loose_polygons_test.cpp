@@ -5,12 +5,12 @@
 #include <algorithm>
 
 namespace hermesh {
-namespace {
+namespace loose_polygons_test {
 
 using Eigen::Vector3d;
 using Indices = std::vector<std::size_t>;
 
-/// A polygon of a mesh by its number: quads and triangles are numbered apart.
+/// A polygon of a mesh by its index: quads and triangles are numbered separately.
 struct Which {
   std::size_t number;
   bool is_quad;
@@ -66,7 +66,7 @@ TEST(LoosePolygons, MeetWhatPassesThroughThem) {
   EXPECT_EQ(two_triangles(1.5).that_meet({kFirstTriangle, kSecondTriangle}), Indices{});
 }
 
-/// Polygons whose boxes share but one cube of the lattice by which they are found.
+/// Polygons whose boxes share only one cube of the lattice that the search uses.
 TEST(LoosePolygons, MeetAcrossTheLattice) {
   Mesh mesh{{{-30, 0.5, 0.5}, {30, 0.5, 0.5}, {30, 1, 0.5}, {20.5, -20, 0}, {20.5, 20, 0}, {20.5, 0, 3}},
             {},
@@ -97,21 +97,21 @@ TEST(LoosePolygons, MeetThemselvesWhereTheyAreFolded) {
   EXPECT_EQ(mesh.that_meet({kFirstQuad}), Indices{0});
 }
 
-/// Two quads, tilted against one another, with one diagonal: four triangles at one edge, of which no two
-/// meet.
+/// Two quads, tilted against one another, with a common diagonal: four triangles at one edge, no two of which
+/// intersect.
 TEST(LoosePolygons, HaveDiagonalsOfTheirOwn) {
   Mesh mesh{{{0, 0, 0}, {4, 0, 1}, {4, 4, 0}, {0, 4, 1}, {4, 0, -3}, {0, 4, -3}}, {{0, 1, 2, 3}}, {}};
   EXPECT_EQ(mesh.that_meet({kFirstQuad}), Indices{});
   mesh.quads.push_back({2, 5, 0, 4});
   EXPECT_EQ(mesh.that_meet({kFirstQuad}), Indices{0});
   mesh.quads.back() = {5, 0, 4,
-                       2};  // cut along the other one, which the sides of the first quad do not touch
+                       2};  // cut along the other diagonal, which the sides of the first quad do not touch
   EXPECT_EQ(mesh.that_meet({kFirstQuad}), Indices{});
   mesh.triangles.push_back({0, 2, 5});
   EXPECT_EQ(mesh.that_meet({kFirstQuad}), Indices{0});
 }
 
-/// Nothing is tested around a corner that somebody else has looked at, but everywhere else.
+/// Nothing is tested around a settled corner, but all other positions are.
 TEST(LoosePolygons, NeedNoTestAroundSettledCorners) {
   Mesh mesh{{{0, 0, 0}, {4, 0, 0}, {0, 4, 0}, {4, 4, 0}, {1, 1, 0}},
             {{0, 1, 3, 2}},
@@ -123,5 +123,5 @@ TEST(LoosePolygons, NeedNoTestAroundSettledCorners) {
   EXPECT_EQ(mesh.that_meet({kFirstQuad}, {0}), Indices{0});
 }
 
-}  // namespace
+}  // namespace loose_polygons_test
 }  // namespace hermesh

@@ -6,12 +6,12 @@
 #include <numbers>
 
 namespace hermesh {
-namespace {
+namespace polygon_stars_test {
 
 using Eigen::Vector3d;
 
-/// Whether the star of triangles from the origin to each two places of a ring that follow one another is
-/// plain, seen from above.
+/// Returns true if the star of triangles from the origin to each two consecutive points of a ring is plain,
+/// seen from above.
 bool is_plain(const std::vector<Vector3d>& ring, const Vector3d& up = Vector3d::UnitZ()) {
   PolygonStars stars(2);
   stars.ask(1);
@@ -20,7 +20,7 @@ bool is_plain(const std::vector<Vector3d>& ring, const Vector3d& up = Vector3d::
   return stars.is_plain(1);
 }
 
-/// A ring of places, evenly around the origin, that goes around so many times.
+/// Returns a ring of points, evenly spaced around the origin, with the given number of turns.
 std::vector<Vector3d> around(int places, int turns) {
   std::vector<Vector3d> ring;
   for (int i = 0; i < places; ++i) {
@@ -34,7 +34,7 @@ TEST(PolygonStars, ArePlainIfTheyGoAroundOnce) {
   EXPECT_TRUE(is_plain(around(3, 1)));
   EXPECT_TRUE(is_plain(around(8, 1)));
   EXPECT_FALSE(is_plain(around(7, 2)));
-  EXPECT_FALSE(is_plain(around(7, 6)));  // the other way
+  EXPECT_FALSE(is_plain(around(7, 6)));  // the opposite orientation
   EXPECT_FALSE(is_plain({}));
 }
 
@@ -62,7 +62,7 @@ TEST(PolygonStars, AreNotPlainIfATriangleStandsUpright) {
   EXPECT_FALSE(is_plain(ring));
 }
 
-/// A ray that passes along a side counts it once.
+/// A ray that passes along a side counts that side once.
 TEST(PolygonStars, MayHaveASideAnywhere) {
   for (int i = 0; i < 64; ++i) {
     const double turned = std::numbers::pi * i / 32;
@@ -74,5 +74,5 @@ TEST(PolygonStars, MayHaveASideAnywhere) {
   }
 }
 
-}  // namespace
+}  // namespace polygon_stars_test
 }  // namespace hermesh

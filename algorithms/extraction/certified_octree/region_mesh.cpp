@@ -18,9 +18,9 @@ namespace {
 
 using Eigen::Vector3d;
 
-/// The polygons that have a cube at a corner, block by block, and those of the uniform mesh elsewhere.
-/// Corners have names: first cells' points, as the uniform mesh numbers them, then cubes, which keep theirs
-/// when others are proposed, and then points on fanned edges, which do not.
+/// The polygons with a cube at a corner, by block, and those of the uniform mesh elsewhere. Corners have
+/// names: first the cells' vertices, as numbered in the uniform mesh, then cubes, whose names do not change
+/// when others are proposed, and then vertices on fanned edges, whose names do change.
 class RegionPolygons {
  public:
   RegionPolygons(const CellRegions& regions, const UniformPoints& points, const RunContext& context)
@@ -32,8 +32,8 @@ class RegionPolygons {
         made_(cells_.size()),
         untested_(filled(cells_.size(), BlockMask{}, context)) {}
 
-  /// Makes the polygons of blocks anew where any are others than they were: `changed` has the samples, by
-  /// block, whose edges may have others.
+  /// Rebuilds the polygons of blocks in which any have changed: `changed` has the samples, by block, whose
+  /// edges may have different polygons.
   void update(std::span<const BlockMask> changed, RunContext& context) {
     Stage stage(context, "connect regions");
     parallel_blocks(cells_.size(), context, [&](std::size_t b) {
@@ -41,8 +41,8 @@ class RegionPolygons {
       for (std::size_t word = 0; word < 8; ++word) untested_[b][word] |= changed[b][word];
       const auto block = static_cast<std::int32_t>(b);
       const std::array<BlockMask, 3> lone = regions_.lone_edges(block);
-      // Where cubes merge most of the surface few blocks have such edges, and memory is taken for those
-      // alone.
+      // If cubes merge most of the surface, few blocks have such edges, and memory is allocated only for
+      // those.
       if (any(lone[0]) || any(lone[1]) || any(lone[2]))
         lone_edges_.at(b) = lone;
       else
@@ -62,7 +62,8 @@ class RegionPolygons {
     return sum;
   }
 
-  /// The edges of loose polygons that meet others that have a cube at a corner, where any of the two are new.
+  /// Returns the edges of loose polygons that intersect others with a cube at a corner, if either of the two
+  /// is new.
   std::vector<CellBlocks::Edge> loose_that_meet(std::span<const BlockMask> changed,
                                                 RunContext& context) const {
     Stage stage(context, "test loose polygons");
@@ -74,14 +75,14 @@ class RegionPolygons {
     });
   }
 
-  /// The edges of loose polygons that meet others of the uniform mesh, where any of the two are new since
-  /// this was asked last.
+  /// Returns the edges of loose polygons that intersect others of the uniform mesh, if either of the two is
+  /// new since the last call.
   std::vector<CellBlocks::Edge> loose_that_meet(const EdgePolygons& fine, RunContext& context) {
     Stage stage(context, "test loose polygons");
     const LargeArray<BlockMask> changed =
         std::exchange(untested_, filled(made_.size(), BlockMask{}, context));
     return that_meet(changed, two_on(changed), nullptr, context, [&](std::size_t b, auto&& test) {
-      // The triangles of a fan have one edge, and are told apart by a count over the block.
+      // The triangles of a fan have one edge, and are distinguished by a count over the block.
       std::uint64_t part = 0;
       for_each_edge(b, lone_edges_[b], [&](const CellBlocks::Edge& edge) {
         const auto on_polygon = [&](auto corners) {
@@ -95,8 +96,8 @@ class RegionPolygons {
     });
   }
 
-  /// Makes the mesh. There are no polygons here any more then: what a block has is freed in parallel, too.
-  /// `fine` has the polygons of lone edges.
+  /// Moves the polygons into the mesh, and leaves none here: the data of the blocks are also freed in
+  /// parallel. `fine` has the polygons of lone edges.
   RegionMesh take_mesh(const EdgePolygons& fine, RunContext& context) {
     Stage stage(context, "connect regions");
     const std::size_t n = cells_.size();
@@ -106,8 +107,8 @@ class RegionPolygons {
       return is_cube(name) ? number_of_cube[name - first_cube_]
                            : number_of_point[points_.slot(point_of(name))];
     };
-    // Count, scan, fill. Points are numbered before any polygon is written, for its corners may be those of
-    // other blocks.
+    // Count, scan, fill. Vertices are numbered before any polygon is written, because its corners may be
+    // those of other blocks.
     std::vector<std::uint64_t> points(n), quads(n), triangles(n);
     parallel_blocks(n, context, [&](std::size_t b) {
       for_each_point(b, fine, [&](std::uint32_t) { ++points[b]; });
@@ -144,7 +145,7 @@ class RegionPolygons {
 
  private:
   struct Polygon {
-    std::uint64_t name;  ///< tells its edge, see name_of()
+    std::uint64_t name;  ///< determines its edge, see name_of()
     int corners;
     std::array<std::uint32_t, 4> names;
     int sample() const { return static_cast<int>(name & 511); }
@@ -155,44 +156,45 @@ class RegionPolygons {
       return std::span(names).first(static_cast<std::size_t>(corners));
     }
   };
-  /// What a block has.
+  /// The polygons of a block.
   struct Made {
     std::vector<Polygon> polygons;
-    std::vector<std::uint32_t> loose;  ///< which of the polygons are loose
+    std::vector<std::uint32_t> loose;  ///< indices of the loose polygons
   };
 
   template <class F>
   static void for_each_edge(std::size_t block, const std::array<BlockMask, 3>& edges, F&& f) {
     for (int axis = 0; axis < 3; ++axis)
-      for_each_bit(edges[static_cast<std::size_t>(axis)], [&](int sample) {
+      for_each_bit(edges[axis], [&](int sample) {
         f(CellBlocks::Edge{static_cast<std::int32_t>(block), sample, axis});
       });
   }
 
   std::uint32_t first_fan() const { return first_cube_ + static_cast<std::uint32_t>(regions_.cube_count()); }
-  /// The name of a region's point.
+  /// Returns the name of a region's vertex.
   std::uint32_t name_of(const Region& region) const {
     return region.merged() ? first_cube_ + regions_.number(region)
                            : cells_.point(region.block, region.cell, 0);
   }
-  /// The name of a point of the uniform mesh.
+  /// Returns the name of a vertex of the uniform mesh.
   std::uint32_t name_of(std::uint32_t point) const {
     return point < first_cube_ ? point : point - first_cube_ + first_fan();
   }
-  /// The name of a polygon; `part` is 0 for that of regions, and counts those of the uniform mesh.
+  /// Returns the name of a polygon; `part` is 0 for polygons of regions, and counts those of the uniform
+  /// mesh.
   static std::uint64_t name_of(const CellBlocks::Edge& edge, std::uint64_t part) {
     return (part << 44) + (static_cast<std::uint64_t>(edge.block) << 11 |
                            static_cast<std::uint64_t>(edge.axis << 9 | edge.sample));
   }
   const Vector3d& place(std::uint32_t name) const {
-    return is_cube(name) ? regions_.place(name - first_cube_) : points_[point_of(name)];
+    return is_cube(name) ? regions_.cube(name - first_cube_).place : points_[point_of(name)];
   }
-  /// The point of the uniform mesh that has a name, which must be no cube's.
+  /// Returns the vertex of the uniform mesh with a name, which must not be that of a cube.
   std::uint32_t point_of(std::uint32_t name) const {
     return name < first_cube_ ? name : name - first_fan() + first_cube_;
   }
   bool is_cube(std::uint32_t name) const { return name >= first_cube_ && name < first_fan(); }
-  /// A polygon as LoosePolygons wants it, with the corners that `stars` settles; none if that is null.
+  /// Converts a polygon for LoosePolygons, with the corners that `stars` settles; none if that is null.
   NamedPolygon named(const Polygon& polygon, const PolygonStars* stars) const {
     NamedPolygon result{polygon.name, polygon.corners, polygon.names, {}, 0};
     for (std::size_t i = 0; i < static_cast<std::size_t>(polygon.corners); ++i) {
@@ -203,8 +205,8 @@ class RegionPolygons {
     return result;
   }
 
-  /// The stars of the cubes that new loose polygons have. A cube's polygons are in blocks next to its own, or
-  /// there, so those of blocks in `near`, which is two_on(changed), are all of them.
+  /// Returns the stars of the cubes of new loose polygons. A cube's polygons are in its own block or the
+  /// adjacent ones, so the blocks in `near`, which is two_on(changed), contain all of them.
   PolygonStars stars_of_loose(std::span<const BlockMask> changed, const std::vector<std::uint8_t>& near,
                               RunContext& context) const {
     PolygonStars stars(regions_.cube_count());
@@ -222,7 +224,7 @@ class RegionPolygons {
           const std::uint32_t cube = names[i] - first_cube_;
           if (!is_cube(names[i]) || !stars.is_asked(cube)) continue;
           // Seen along the cube's mean normal, along which its polygons should face up.
-          const Vector3d &point = place(names[i]), up = regions_.normal(cube).cast<double>();
+          const Vector3d &point = place(names[i]), up = regions_.cube(cube).normal.cast<double>();
           const auto add = [&](std::size_t first, std::size_t second) {
             stars.add(cube, up, place(names[first]) - point, place(names[second]) - point);
           };
@@ -239,12 +241,12 @@ class RegionPolygons {
     return stars;
   }
 
-  /// The edges of loose polygons that meet others. A loose polygon is within a block of its edge's, so two
-  /// polygons can only meet if these are at most two apart.
+  /// Returns the edges of loose polygons that intersect others. A loose polygon is at most one block away
+  /// from its edge's, so two polygons can only intersect if their blocks are at most two apart.
   /// @param changed samples whose edges have new polygons, by block
   /// @param near two_on(changed)
-  /// @param stars as named() wants them
-  /// @param context asked whether to stop
+  /// @param stars as for named()
+  /// @param context receives the request to cancel
   /// @param others called with a block and a function, which it calls with samples of edges, and functions
   ///   for their polygons
   template <class F>
@@ -252,7 +254,7 @@ class RegionPolygons {
                                           const std::vector<std::uint8_t>& near, const PolygonStars* stars,
                                           RunContext& context, F&& others) const {
     std::vector<CellBlocks::Edge> result;
-    // New loose ones beside all others, and then the others beside new ones.
+    // New loose polygons against all others, and then the other loose polygons against new ones.
     for (const bool is_new : {true, false}) {
       const auto for_each_asked = [&](std::size_t b, auto&& f) {
         if (!near[b]) return;
@@ -277,7 +279,7 @@ class RegionPolygons {
       LoosePolygons loose(std::move(polygons), context);
       parallel_blocks(made_.size(), context, [&](std::size_t b) {
         if (!near[b]) return;
-        // The polygons of one block are near one another, which is what test_against() is quick for.
+        // The polygons of one block are near one another, so test_against() is fast.
         thread_local std::vector<NamedPolygon> beside;
         beside.clear();
         others(b, [&](int sample, auto&& polygon) {
@@ -290,8 +292,8 @@ class RegionPolygons {
     return result;
   }
 
-  /// Makes the polygon of an edge: rotated so that a quad is cut from its first corner to its third, and
-  /// turned about where the outside is below.
+  /// Builds the polygon of an edge: rotated so that a quad is cut from its first corner to its third, and
+  /// reversed if the outside is below.
   void make(const CellBlocks::Edge& edge, Made& made) const {
     const RegionPolygon polygon = polygon_of(regions_, edge, ring_of(regions_, edge));
     if (polygon.loose) made.loose.push_back(static_cast<std::uint32_t>(made.polygons.size()));
@@ -299,8 +301,7 @@ class RegionPolygons {
     for (std::size_t i = 0; i < static_cast<std::size_t>(polygon.corners); ++i)
       result.names[i] = name_of(polygon.regions[(static_cast<std::size_t>(polygon.diagonal) + i) %
                                                 static_cast<std::size_t>(polygon.corners)]);
-    if (!polygon.outwards)
-      std::swap(result.names[1], result.names[static_cast<std::size_t>(polygon.corners - 1)]);
+    if (!polygon.outwards) std::swap(result.names[1], result.names[polygon.corners - 1]);
     made.polygons.push_back(result);
   }
 
@@ -324,8 +325,7 @@ class RegionPolygons {
     });
   }
 
-  /// Calls f(name) for those of the mesh's points that a block has: cubes, cells that are alone, points on
-  /// fans.
+  /// Calls f(name) for the vertices of the mesh in a block: cubes, single cells, vertices on fans.
   template <class F>
   void for_each_point(std::size_t b, const EdgePolygons& fine, F&& f) const {
     const auto block = static_cast<std::int32_t>(b);
@@ -339,7 +339,7 @@ class RegionPolygons {
     });
   }
 
-  /// The blocks, 1 each, at most two steps from those that have any of the cells.
+  /// Returns a flag per block, 1 for those at most two steps from a block with any of the cells.
   std::vector<std::uint8_t> two_on(std::span<const BlockMask> cells) const {
     std::vector<std::uint8_t> result(cells.size());
     std::vector<std::size_t> last, next;
@@ -348,13 +348,12 @@ class RegionPolygons {
         result[b] = 1;
         last.push_back(b);
       }
-    // As in the first round, when everything is new.
+    // All blocks, as in the first round, when everything is new.
     if (last.size() == cells.size()) return result;
     for (int step = 0; step < 2; ++step) {
       for (const std::size_t b : last)
-        for (const std::int32_t there : cells_.source(static_cast<std::int32_t>(b)).neighbours)
-          if (there >= 0 && !std::exchange(result[static_cast<std::size_t>(there)], 1))
-            next.push_back(static_cast<std::size_t>(there));
+        for (const std::int32_t there : cells_.source(b).neighbours)
+          if (there >= 0 && !std::exchange(result[there], 1)) next.push_back(static_cast<std::size_t>(there));
       last = std::exchange(next, {});
     }
     return result;
@@ -364,13 +363,13 @@ class RegionPolygons {
   const CellBlocks& cells_;
   const UniformPoints& points_;
   const std::uint32_t first_cube_;  ///< name
-  EdgeMasks lone_edges_;            ///< edges whose polygons are of the uniform mesh
+  EdgeMasks lone_edges_;            ///< edges with polygons of the uniform mesh
   std::vector<Made> made_;          ///< one for each block
   LargeArray<BlockMask> untested_;  ///< changed samples not yet tested against the uniform mesh, by block
 };
 
-/// The tolerance of each point of the uniform mesh, those on fanned edges included, whose tolerance is the
-/// least of the four cells around.
+/// Returns the tolerance of each vertex of the uniform mesh, including those on fanned edges, whose tolerance
+/// is the least of the four cells around.
 std::vector<float> tolerances_of_points(const CellBlocks& cells, const EdgePolygons& polygons,
                                         const CellTolerances& tolerance, RunContext& context) {
   std::vector<float> result(polygons.point_count());
@@ -391,8 +390,8 @@ std::vector<float> tolerances_of_points(const CellBlocks& cells, const EdgePolyg
   return result;
 }
 
-/// Splits cubes until all promises are kept, and makes the mesh. `connect(edges)` returns the polygons of the
-/// uniform mesh, of these edges at least.
+/// Splits cubes until all guarantees hold, and builds the mesh. `connect(edges)` returns the polygons of the
+/// uniform mesh, at least those of the given edges.
 template <class Connect>
 RegionMesh merge(const CellRegions& regions, const UniformPoints& points, RegionProof& proof,
                  Connect&& connect, RunContext& context) {
@@ -401,9 +400,9 @@ RegionMesh merge(const CellRegions& regions, const UniformPoints& points, Region
     for (const CellBlocks::Edge& edge : meeting) proof.call_unproven(edge);
     return !meeting.empty();
   };
-  // What each turn finds it splits, so there are at most as many turns as cubes. Distances are proved first;
-  // contacts are only asked for among polygons that would stay; the uniform mesh, which may have to be made
-  // for it, is last.
+  // Each round splits the cubes that it finds, so there are at most as many rounds as cubes. Distances are
+  // proved first; only polygons that pass are tested for self-intersections, and last against the uniform
+  // mesh, which may have to be built for that.
   for (std::size_t splits = 0;;) {
     splits += proof.run();
     const LargeArray<BlockMask> changed = proof.take_changed();
@@ -423,18 +422,17 @@ RegionMesh merge_regions(UniformCells& uniform, bool in_hulls, const RegionOptio
                          const FilePoints& file, RunContext& context) {
   const CellBlocks& cells = uniform.cells();
   const UniformPoints& points = uniform.points();
-  // Large tolerances do without the uniform mesh but for what stays of it: beyond the cubes' diagonal nothing
-  // is to be shown of distances, below it slabs show them (region_proof.h).
-  if (options.tolerance.least() > RegionSlabs::kLeast) {
-    const bool needs_slabs =
+  // Large tolerances need only the remaining parts of the uniform mesh: beyond the cubes' diagonal no
+  // distance needs a proof, and below it layers prove it (region_proof.h).
+  if (options.tolerance.least() > RegionLayers::kLeast) {
+    const bool needs_layers =
         options.tolerance.least() <= RegionProof::kDiagonal * float(options.largest_cube);
-    if (needs_slabs && !in_hulls) uniform.place_all(context);
+    if (needs_layers && !in_hulls) uniform.place_all(context);
     CellRegions regions(cells, points, options, file, context);
-    std::optional<RegionSlabs> slabs;
-    if (needs_slabs) slabs.emplace(regions, in_hulls ? nullptr : &points, context);
-    RegionProof proof =
-        slabs ? RegionProof(regions, *slabs, uniform, context) : RegionProof(regions, uniform, context);
-    // Made anew after each split, of the edges that are lone by then.
+    std::optional<RegionLayers> layers;
+    if (needs_layers) layers.emplace(regions, in_hulls ? nullptr : &points, context);
+    RegionProof proof(regions, layers ? &*layers : nullptr, nullptr, &uniform, context);
+    // Computed again after each split, for the current lone edges.
     std::optional<EdgePolygons> fine;
     return merge(
         regions, points, proof,
@@ -443,7 +441,8 @@ RegionMesh merge_regions(UniformCells& uniform, bool in_hulls, const RegionOptio
         },
         context);
   }
-  // Up to two voxels a shell proves each polygon by all of the uniform mesh around it, so that is made first.
+  // Up to two voxels, a shell compares each polygon with the uniform mesh around it, so all of that is built
+  // first.
   uniform.place_all(context);
   const EdgePolygons fine = uniform.connect(nullptr, context);
   CellRegions regions(cells, points, options, file, context);
@@ -452,7 +451,7 @@ RegionMesh merge_regions(UniformCells& uniform, bool in_hulls, const RegionOptio
     Stage stage(context, "prepare the proof");
     return RegionShell(regions, fine, points, tolerance, context);
   }();
-  RegionProof proof(regions, shell, context);
+  RegionProof proof(regions, nullptr, &shell, nullptr, context);
   return merge(
       regions, points, proof, [&](const EdgeMasks&) -> const EdgePolygons& { return fine; }, context);
 }

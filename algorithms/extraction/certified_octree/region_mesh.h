@@ -1,4 +1,4 @@
-// The quick way to a coarser mesh: cubes of cells become one point each (`certified-octree`).
+// Fast adaptive contouring: cubes of cells become one vertex each (`certified-octree`).
 #pragma once
 
 #include <Eigen/Core>
@@ -18,18 +18,18 @@ struct RegionMesh {
   std::vector<Eigen::Vector3d> points;  ///< FilePoints::rounded()
   std::vector<Triangle> triangles;
   LargeArray<Quad> quads;
-  std::vector<std::uint8_t> of_cube;  ///< 1 for points that stand for more than one cell
+  std::vector<std::uint8_t> of_cube;  ///< 1 for vertices that represent more than one cell
 };
 
 /// Merges cells by cubes. The mesh is closed, oriented, manifold and free of self-intersection if the uniform
-/// mesh is, and within the tolerance of it both ways (region_proof.h). The same bytes for every number of
-/// threads.
-/// @param uniform with no points made yet
-/// @param in_hulls whether its points lie in the hull of their cells' crossings, as means do
+/// mesh is, and within the tolerance of it both ways (region_proof.h). The result is identical for any number
+/// of threads.
+/// @param uniform without any vertices yet
+/// @param in_hulls true if its vertices lie in the hull of their cells' crossings, as means do
 /// @param options tolerance and sizes of cubes
-/// @param file rounds places to the file's precision
-/// @param context told of progress and figures, and asked whether to stop
-/// @throws Error for more points or polygons than 32 bits can number; Cancelled
+/// @param file rounds positions to the file's precision
+/// @param context receives the progress, the statistics and the request to cancel
+/// @throws Error for more vertices or polygons than 32 bits can number; Cancelled
 RegionMesh merge_regions(UniformCells& uniform, bool in_hulls, const RegionOptions& options,
                          const FilePoints& file, RunContext& context);
 

@@ -11,12 +11,12 @@
 #include "algorithms/extraction/certified_octree/certified_octree.h"
 #include "algorithms/extraction/certified_octree/region_proof.h"
 #include "algorithms/extraction/embedded_mesh/uniform_mesh.h"
+#include "algorithms/hermite/normal_codes.h"
 #include "algorithms/hermite/samplers.h"
-#include "algorithms/hermite/with_normal_code.h"
 #include "algorithms/lattice/simd/simd_level.h"
 
 namespace hermesh {
-namespace {
+namespace region_mesh_test {
 
 using Eigen::Vector3d;
 
@@ -35,7 +35,8 @@ PolygonMesh contour(const FloatHermite& hermite, double tolerance, double flatne
                           {.tolerance = tolerance, .flatness = flatness, .uniform = {}}, nullptr, context);
 }
 
-/// Distances of a mesh's corners and middles of edges and triangles from a sphere about the origin, at most.
+/// Returns the largest distance of a mesh's vertices, edge midpoints and triangle centres from a sphere about
+/// the origin.
 double farthest_from_sphere(const PolygonMesh& mesh, double radius) {
   double farthest = 0;
   for (const Triangle& t : triangulated(mesh))
@@ -68,7 +69,7 @@ TEST(RegionMesh, FlatnessKeepsCubesSmall) {
   EXPECT_LT(farthest_from_sphere(flat, 20.0), farthest_from_sphere(coarse, 20.0) / 2);
 }
 
-/// Tolerances beyond the cubes' diagonal, so that nothing is to be shown of distances.
+/// Uses tolerances beyond the cubes' diagonal, so that no distance needs a proof.
 TEST(RegionMesh, CubesAreAtMostAsLargeAsAsked) {
   const FloatHermite hermite = sphere(20.0);
   RunContext context;
@@ -83,7 +84,7 @@ TEST(RegionMesh, CubesAreAtMostAsLargeAsAsked) {
   EXPECT_GT(points[1], 2 * points[2]);
 }
 
-/// V − E + F of triangles that are closed.
+/// Returns V − E + F of closed triangles.
 std::int64_t euler_characteristic(const PolygonMesh& mesh) {
   return std::int64_t(mesh.points.size()) - std::int64_t(mesh.triangle_count()) / 2;
 }
@@ -106,7 +107,7 @@ TEST(RegionMesh, HasTheUniformMeshesTopology) {
 }
 
 /// One sample that is barely inside: two cubes may have four cells of it each, all in the face between them,
-/// and no third region around any edge.
+/// and no edge has a third region around it.
 TEST(RegionMesh, NoSpeckVanishes) {
   initialize_openvdb();
   for (int place = 0; place < 8; ++place)
@@ -133,7 +134,7 @@ TEST(RegionMesh, ToleranceOfZeroIsTheUniformMeshWithPointsInTheirCells) {
               manifold_dual_contouring(view_of(hermite, context), options, nullptr, context));
 }
 
-/// A sphere with waves of some fifteen voxels, on which cubes of all sizes stay.
+/// Returns a sphere with waves of some fifteen voxels, on which cubes of all sizes remain.
 FloatHermite waves() {
   return sample(
       {.value = [](const Vector3d& p) { return p.norm() - 18 - std::sin(p[0] / 2.5) * std::cos(p[1] / 3.0); },
@@ -159,7 +160,7 @@ TEST(RegionMesh, SameBytesAtAnyThreadCount) {
   }
 }
 
-/// Packed crossings are read where they are; what they are turned into beforehand must make no difference.
+/// Packed crossings are decoded on access; decoding them beforehand must give the same result.
 TEST(RegionMesh, SameFromPackedDataAsFromWhatTheyUnpackTo) {
   RunContext context;
   const PackedHermite packed = pack(waves(), NormalCodeId::octahedral, context);
@@ -187,8 +188,8 @@ TEST(RegionMesh, SameBytesAtEverySimdLevel) {
   unsetenv("HERMESH_SIMD");
 }
 
-/// Proposals that are good for one tolerance are all taken back where another one is asked for, which none
-/// can keep: the proof does not rest on what was proposed.
+/// Proposals that are good for one tolerance are all rejected if a smaller one is requested, which none can
+/// satisfy: the proof does not rely on the proposals.
 TEST(RegionProof, SplitsWhatIsNotNear) {
   const FloatHermite hermite = sphere(12.0);
   RunContext context;
@@ -212,7 +213,7 @@ TEST(RegionProof, SplitsWhatIsNotNear) {
     options.tolerance = CellTolerances(1e-4f);
     const std::vector<float> narrow(polygons.point_count(), 1e-4f);
     const RegionShell shell(regions, polygons, uniform.points(), narrow, context);
-    RegionProof(regions, shell, context).run();
+    RegionProof(regions, nullptr, &shell, nullptr, context).run();
     EXPECT_EQ(cubes(regions), 0u);
   }
   {
@@ -220,13 +221,13 @@ TEST(RegionProof, SplitsWhatIsNotNear) {
     CellRegions regions(cells, uniform.points(), options, file, context);
     EXPECT_GT(cubes(regions), 20u);
     options.tolerance = CellTolerances(1e-4f);
-    RegionSlabs slabs(regions, nullptr, context);
-    RegionProof(regions, slabs, uniform, context).run();
+    RegionLayers layers(regions, nullptr, context);
+    RegionProof(regions, &layers, nullptr, &uniform, context).run();
     EXPECT_EQ(cubes(regions), 0u);
   }
 }
 
-/// A box along the axes: what is flat merges right up to the cells that an edge passes through.
+/// A box along the axes: flat parts merge right up to the cells that an edge passes through.
 TEST(RegionProof, KeepsWhatIsFlat) {
   const FloatHermite hermite =
       sample({.value = [](const Vector3d& p) { return p.cwiseAbs().maxCoeff() - 20.4; },
@@ -239,5 +240,5 @@ TEST(RegionProof, KeepsWhatIsFlat) {
   EXPECT_LT(contour(hermite, 0.1).points.size(), contour(hermite, 0.0).points.size() / 5);
 }
 
-}  // namespace
+}  // namespace region_mesh_test
 }  // namespace hermesh

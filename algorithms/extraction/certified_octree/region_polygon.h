@@ -1,7 +1,8 @@
-// The polygon that a crossing edge has where cells share points.
+// The polygon of a crossed edge between regions.
 #pragma once
 
 #include <Eigen/Core>
+#include <algorithm>
 #include <array>
 #include <cstdint>
 
@@ -9,27 +10,38 @@
 
 namespace hermesh {
 
-/// The polygon of an edge that has three or four regions around it. The edge between the regions is the
-/// common part of their edges there. Its envelope is made of a tetrahedron for each two regions that follow
-/// one another, of the edge and their points, as on an octree (Ju & Udeshi 2006): that one is cut in two by
-/// the common part of the regions' faces, which the segment between the points passes through. Where it does
-/// not, or the polygon does not keep to its envelope, however it is cut, the polygon is *loose*.
-struct RegionPolygon {
-  CellBlocks::Edge crossing;  ///< the lattice edge that is crossed
-  int corners = 0;            ///< 3 or 4, counter-clockwise seen against the edge's axis
+/// The regions around a crossed edge, in order; the edge has no polygon if there are fewer than three.
+struct RegionRing {
+  int corners = 0;
   std::array<Region, 4> regions{};
-  std::array<Eigen::Vector3d, 4> points;
   std::array<int, 4> across{};  ///< axis of the step from each region to the next
-  Eigen::Vector3d start;        ///< where the edge between the regions begins
-  double length = 0;            ///< how long that edge is, voxels
-  bool outwards = false;        ///< the outside is where the axis points to
-  int diagonal = 0;             ///< a quad is cut from this corner to the one after the next
+  int least_level = CellRegions::kLevels;
+  const Region& largest() const {
+    return *std::max_element(regions.begin(), regions.begin() + corners,
+                             [](const Region& a, const Region& b) { return a.level < b.level; });
+  }
+};
+
+/// The polygon of an edge with three or four regions around it. The edge between the regions is the common
+/// part of their edges there. Its envelope consists of a tetrahedron for each two consecutive regions, of the
+/// edge and their vertices, as on an octree (Ju & Udeshi 2006): the common part of the regions' faces divides
+/// it in two, if the segment between the vertices intersects that part. If it does not, or no division keeps
+/// the polygon in its envelope, the polygon is *loose*.
+struct RegionPolygon : RegionRing {
+  CellBlocks::Edge crossing;              ///< the crossed lattice edge
+  std::array<Eigen::Vector3d, 4> points;  ///< corners, counter-clockwise seen against the edge's axis
+  Eigen::Vector3d start;                  ///< of the edge between the regions
+  double length = 0;                      ///< of the edge between the regions, voxels
+  bool outwards = false;                  ///< the outside is in the direction of the axis
+  int diagonal = 0;                       ///< a quad is cut from this corner to the one after the next
   bool loose = false;
 
-  /// The corner that follows corner i.
   int next(int i) const { return i + 1 < corners ? i + 1 : 0; }
-  int axis() const { return crossing.axis; }
-
+  /// Returns where the segment between corners i and j intersects the plane through the edge across an axis.
+  Eigen::Vector3d pass(int i, int j, int axis) const {
+    const Eigen::Vector3d &p = points[i], &q = points[j];
+    return p + (start[axis] - p[axis]) / (q[axis] - p[axis]) * (q - p);
+  }
   /// Calls f(corner, corner, corner) for each triangle, counter-clockwise seen from outside.
   template <class F>
   void for_each_triangle(F&& f) const {
@@ -40,23 +52,15 @@ struct RegionPolygon {
   }
 };
 
-/// A place on the common part of the faces of two regions, that of corner `side` and the next: where the
-/// segment between their points passes it, or a place beside that, off its border.
-Eigen::Vector3d place_on_face(const CellBlocks& cells, const RegionPolygon& polygon, int side);
+/// Returns a point of the common part of the faces of the regions of corner i and the next: the intersection
+/// with the segment between their vertices, moved into the interior if necessary.
+Eigen::Vector3d place_on_face(const CellBlocks& cells, const RegionPolygon& polygon, int i);
 
-/// The regions around an edge, from corner to corner: fewer than three if there is no polygon.
-struct RegionRing {
-  int corners = 0;
-  std::array<Region, 4> regions{};
-  std::array<int, 4> across{};  ///< axis of the step from each to the next
-  int least_level = CellRegions::kLevels;
-  const Region& largest() const;
-};
-/// The regions around a crossing edge.
+/// Returns the regions around a crossed edge.
 RegionRing ring_of(const CellRegions& regions, const CellBlocks::Edge& edge);
 
-/// The polygon of an edge. `ring` has three regions at least, one of them a cube, so that none is a cell of
-/// several sheets.
+/// Returns the polygon of an edge. `ring` has at least three regions, one of them a cube, so none is a cell
+/// of several sheets.
 RegionPolygon polygon_of(const CellRegions& regions, const CellBlocks::Edge& edge, const RegionRing& ring);
 
 }  // namespace hermesh

@@ -6,78 +6,62 @@
 #include <utility>
 
 #include "algorithms/core/parallel.h"
-#include "algorithms/extraction/certified_octree/region_cubes.h"
-#include "algorithms/extraction/certified_octree/widened_mask.h"
 
 namespace hermesh {
 namespace {
 
-constexpr BlockMask kAllCells = [] {
-  BlockMask mask;
-  mask.fill(~std::uint64_t{0});
-  return mask;
-}();
-
-/// Adds a cube's cells to a mask of its block.
+/// Adds the cells of a cube to a mask of its block.
 void add(BlockMask& mask, const Region& region) {
   for (int x = 0; x < region.side(); ++x)
-    mask[static_cast<std::size_t>((region.cell >> 6) + x)] |= rows_of(region.cell, region.side(), 0, 0);
+    mask[(region.cell >> 6) + x] |= rows_of(region.cell, region.side(), 0, 0);
 }
 
 bool overlap(const BlockMask& mask, const Region& region) {
   for (int x = 0; x < region.side(); ++x)
-    if (mask[static_cast<std::size_t>((region.cell >> 6) + x)] & rows_of(region.cell, region.side(), 0, 0))
-      return true;
+    if (mask[(region.cell >> 6) + x] & rows_of(region.cell, region.side(), 0, 0)) return true;
   return false;
 }
 
+bool any_of(const std::array<BlockMask, 3>& edges) { return any(edges[0]) || any(edges[1]) || any(edges[2]); }
+
 }  // namespace
 
-RegionProof::RegionProof(CellRegions& regions, UniformCells& uniform, RunContext& context)
-    : RegionProof(regions, nullptr, nullptr, &uniform, context) {}
-
-RegionProof::RegionProof(CellRegions& regions, RegionSlabs& slabs, UniformCells& uniform, RunContext& context)
-    : RegionProof(regions, &slabs, nullptr, &uniform, context) {}
-
-RegionProof::RegionProof(CellRegions& regions, const RegionShell& shell, RunContext& context)
-    : RegionProof(regions, nullptr, &shell, nullptr, context) {}
-
-RegionProof::RegionProof(CellRegions& regions, RegionSlabs* slabs, const RegionShell* shell,
+RegionProof::RegionProof(CellRegions& regions, RegionLayers* layers, const RegionShell* shell,
                          UniformCells* uniform, RunContext& context)
     : regions_(regions),
       cells_(regions.cells()),
-      slabs_(slabs),
+      layers_(layers),
       shell_(shell),
       uniform_(uniform),
       context_(context),
       unproven_(cells_.size()),
       any_unproven_(cells_.size()),
-      changed_(filled(cells_.size(), kAllCells, context)),
-      split_cells_(filled(cells_.size(), kAllCells, context)),
-      dirty_(filled(cells_.size(), kAllCells, context)),
+      changed_(filled(cells_.size(), kAllInside, context)),
+      split_cells_(filled(cells_.size(), kAllInside, context)),
+      dirty_(filled(cells_.size(), kAllInside, context)),
       open_(shell ? cells_.size() : 0),
-      loose_(slabs ? cells_.size() : 0) {
-  // Nothing is looked at then, so no turns are needed.
-  if (!slabs && !shell) return;
+      loose_(layers ? cells_.size() : 0) {
+  if (!layers && !shell) return;
   for (std::size_t b = 0; b < cells_.size(); ++b) {
-    const auto& lower = cells_.source(static_cast<std::int32_t>(b)).lower;
-    turns_[static_cast<std::size_t>(((lower[0] >> 3) & 1) << 2 | ((lower[1] >> 3) & 1) << 1 |
-                                    ((lower[2] >> 3) & 1))]
-        .push_back(static_cast<std::uint32_t>(b));
+    const auto& lower = cells_.source(b).lower;
+    turns_[((lower[0] >> 3) & 1) << 2 | ((lower[1] >> 3) & 1) << 1 | ((lower[2] >> 3) & 1)].push_back(
+        static_cast<std::uint32_t>(b));
   }
 }
 
 std::size_t RegionProof::run() {
   Stage stage(context_, "prove regions");
-  std::size_t splits = std::exchange(is_new_, false) ? 0 : split();  // what was called unproven meanwhile
-  // Each round splits a cube at least, until no polygon fails; at worst all cells are alone and T is S.
+  std::size_t splits = std::exchange(is_new_, false) ? 0 : split();
+  // Each round splits at least one cube, until no polygon fails; at worst all cells are single and T is S.
   for (;;) {
-    // Cells that are alone have points in polygons of T; they are made as cubes fall apart.
     if (uniform_) place_lone_points();
-    if (!slabs_ && !shell_) return splits;
-    if (slabs_) begin_slabs();
-    look_at_polygons();
-    if (slabs_) look_at_slabs();
+    if (!layers_ && !shell_) return splits;
+    if (layers_) begin_layers();
+    // The polygons of a block have cubes in that block and those next to it, which no two blocks of one turn
+    // share: so the cubes that are split do not depend on the thread schedule.
+    for (const std::vector<std::uint32_t>& turn : turns_)
+      parallel_blocks(turn.size(), context_, [&](std::size_t i) { look_at_polygons(turn[i]); });
+    if (layers_) look_at_layers();
     const std::size_t now = split();
     if (now == 0) return splits;
     splits += now;
@@ -91,7 +75,7 @@ LargeArray<BlockMask> RegionProof::take_changed() {
 void RegionProof::place_lone_points() {
   LargeArray<BlockMask> alone(cells_.size());
   parallel_blocks(cells_.size(), context_, [&](std::size_t b) {
-    // Elsewhere no cell has become alone since the last time.
+    // Elsewhere no cell has become single since the last call.
     alone[b] = any(split_cells_[b]) ? regions_.alone(static_cast<std::int32_t>(b)) : BlockMask{};
   });
   uniform_->place(alone, context_);
@@ -106,81 +90,69 @@ void RegionProof::for_each_touched(std::size_t b, F&& f) const {
   });
 }
 
-/// Begins the slabs of new cubes. The cubes beside them keep theirs, which still tell of polygons that are
-/// gone: they are wider than need be, but less is done anew.
-void RegionProof::begin_slabs() {
-  slabs_->make_room();
+/// Begins the layers of new cubes. Those next to them keep theirs, which still include replaced polygons:
+/// they are thicker than necessary, but less is recomputed.
+void RegionProof::begin_layers() {
+  layers_->make_room();
   parallel_blocks(cells_.size(), context_, [&](std::size_t b) {
     for_each_touched(b, [&](const Region& cube) {
-      if (overlap(split_cells_[b], cube)) slabs_->begin(cube);
+      if (overlap(split_cells_[b], cube)) layers_->begin(cube);
     });
   });
 }
 
-void RegionProof::look_at_polygons() {
-  // A cube has polygons in its own block and those next to it, and of these no two in one turn: what is
-  // split does not depend on threads.
-  for (const std::vector<std::uint32_t>& turn : turns_)
-    parallel_blocks(turn.size(), context_, [&](std::size_t i) { look_at_polygons(turn[i]); });
-}
-
-/// Looks at the polygons of a block: new ones, those not shown before, and loose ones that may touch new
-/// cubes.
+/// Tests the polygons of a block: new ones, those not proved before, and loose ones that may touch new cubes.
 void RegionProof::look_at_polygons(std::size_t b) {
   const auto block = static_cast<std::int32_t>(b);
   const bool is_dirty = any(dirty_[b]);
-  const bool may_touch = slabs_ && (any(loose_[b][0]) || any(loose_[b][1]) || any(loose_[b][2])) &&
+  const bool may_touch = layers_ && any_of(loose_[b]) &&
                          std::ranges::any_of(cells_.source(block).neighbours, [&](std::int32_t there) {
-                           return there >= 0 && any(split_cells_[static_cast<std::size_t>(there)]);
+                           return there >= 0 && any(split_cells_[there]);
                          });
-  const bool is_open = shell_ && (any(open_[b][0]) || any(open_[b][1]) || any(open_[b][2]));
+  const bool is_open = shell_ && any_of(open_[b]);
   if (!is_dirty && !may_touch && !is_open) return;
   const std::array<BlockMask, 3> edges = regions_.merged_edges(block);
-  for (int axis = 0; axis < 3; ++axis) {
-    const auto a = static_cast<std::size_t>(axis);
+  for (int a = 0; a < 3; ++a) {
     BlockMask looked_at;
     for (std::size_t word = 0; word < 8; ++word) {
-      // With slabs a polygon is never open: it is the cubes that are asked, once all polygons are in.
+      // With layers no polygon is open: the cubes are tested after all polygons were added.
       looked_at[word] = edges[a][word] & (dirty_[b][word] | (shell_ ? open_[b][a][word] : 0));
-      if (slabs_) loose_[b][a][word] &= edges[a][word] & ~looked_at[word];
+      if (layers_) loose_[b][a][word] &= edges[a][word] & ~looked_at[word];
     }
-    // A loose polygon may reach into any cube near it, so it is added again where new ones have been begun;
-    // to widen the slabs of others once more changes nothing.
-    if (slabs_)
+    // A loose polygon may extend into any cube nearby, so it is added again for new ones; this does not
+    // change the layers of others.
+    if (layers_)
       for_each_bit(loose_[b][a], [&](int sample) {
-        const CellBlocks::Edge edge{block, sample, axis};
-        slabs_->add(polygon_of(regions_, edge, ring_of(regions_, edge)));
+        const CellBlocks::Edge edge{block, sample, a};
+        layers_->add(polygon_of(regions_, edge, ring_of(regions_, edge)));
       });
     if (shell_) open_[b][a] = {};
     for_each_bit(looked_at, [&](int sample) {
-      const CellBlocks::Edge edge{block, sample, axis};
-      const auto set = [&](BlockMask& mask) {
-        mask[static_cast<std::size_t>(sample >> 6)] |= std::uint64_t{1} << (sample & 63);
-      };
+      const CellBlocks::Edge edge{block, sample, a};
       const RegionRing ring = ring_of(regions_, edge);
-      // A polygon of a cube that is split anyway is gone in the next round, and stays open. Slabs want all
-      // polygons, and in any order.
+      // A polygon of a cube that is split anyway stays open, and disappears in the next round. Layers require
+      // all polygons, in any order.
       if (shell_ && std::any_of(ring.regions.begin(), ring.regions.begin() + ring.corners,
                                 [&](const Region& region) { return region.merged() && is_unproven(region); }))
-        return set(open_[b][a]);
+        return set_bit(open_[b][a], sample);
       const RegionPolygon polygon = polygon_of(regions_, edge, ring);
-      if (slabs_) {
-        slabs_->add(polygon);
-        if (polygon.loose) set(loose_[b][a]);
+      if (layers_) {
+        layers_->add(polygon);
+        if (polygon.loose) set_bit(loose_[b][a], sample);
       }
-      // Kept to its envelope, a polygon needs nothing with slabs but that its cubes' slabs hold.
-      if (shell_ ? shell_->holds(polygon) : !polygon.loose || slabs_->holds(polygon)) return;
+      // With layers, a polygon in its envelope is proved by those of its cubes.
+      if (shell_ ? shell_->holds(polygon) : !polygon.loose || layers_->holds(polygon)) return;
       call_unproven(ring.largest());
-      if (shell_) set(open_[b][a]);
+      if (shell_) set_bit(open_[b][a], sample);
     });
   }
 }
 
-/// Asks each cube whose polygons may have changed, once all of these have been added.
-void RegionProof::look_at_slabs() {
+/// Tests each cube whose polygons may have changed, after all of these have been added.
+void RegionProof::look_at_layers() {
   parallel_blocks(cells_.size(), context_, [&](std::size_t b) {
     for_each_touched(b, [&](const Region& cube) {
-      if (!slabs_->holds(cube)) call_unproven(cube);
+      if (!layers_->holds(cube)) call_unproven(cube);
     });
   });
 }
@@ -190,20 +162,19 @@ void RegionProof::call_unproven(const CellBlocks::Edge& edge) {
 }
 
 void RegionProof::call_unproven(const Region& cube) {
-  // Bits that are only ever set while others look; split() reads them when all are done.
-  std::atomic_ref(any_unproven_[static_cast<std::size_t>(cube.block)]).store(1, std::memory_order_relaxed);
-  std::atomic_ref(unproven_[static_cast<std::size_t>(cube.block)][cube.level - 1u])
+  // Concurrently, bits are only set; split() reads them afterwards.
+  std::atomic_ref(any_unproven_[cube.block]).store(1, std::memory_order_relaxed);
+  std::atomic_ref(unproven_[cube.block][cube.level - 1u])
       .fetch_or(std::uint64_t{1} << cube_of(cube.cell, cube.level), std::memory_order_relaxed);
 }
 
 bool RegionProof::is_unproven(const Region& cube) {
-  const auto bits = std::atomic_ref(unproven_[static_cast<std::size_t>(cube.block)][cube.level - 1u])
-                        .load(std::memory_order_relaxed);
+  const auto bits = std::atomic_ref(unproven_[cube.block][cube.level - 1u]).load(std::memory_order_relaxed);
   return (bits >> cube_of(cube.cell, cube.level)) & 1;
 }
 
-/// Splits the cubes that were called unproven, proposes smaller ones in their place, and marks what has
-/// changed. Returns how many cubes were split.
+/// Splits the unproven cubes, proposes smaller ones instead, and marks the changed cells. Returns the number
+/// of cubes split.
 std::size_t RegionProof::split() {
   std::vector<std::uint32_t> splits(cells_.size());
   parallel_blocks(cells_.size(), context_, [&](std::size_t b) {
@@ -222,22 +193,18 @@ std::size_t RegionProof::split() {
     }
     splits[b] = static_cast<std::uint32_t>(here.size());
   });
-  // Smaller cubes are proposed for all blocks at once, when no block is splitting any more.
   const std::size_t all = std::reduce(splits.begin(), splits.end(), std::size_t{0});
   if (all == 0) return 0;
   regions_.propose_parts(context_);
   parallel_blocks(cells_.size(), context_, [&](std::size_t b) {
-    const auto& neighbours = cells_.source(static_cast<std::int32_t>(b)).neighbours;
+    const auto& neighbours = cells_.source(b).neighbours;
     dirty_[b] = {};
-    if (std::ranges::none_of(neighbours, [&](std::int32_t there) {
-          return there >= 0 && splits[static_cast<std::size_t>(there)] > 0;
-        }))
+    if (std::ranges::none_of(neighbours, [&](std::int32_t there) { return there >= 0 && splits[there] > 0; }))
       return;
-    // A polygon has changed if a region around its edge has: its edge starts in one of the split cubes or
-    // next to it.
+    // A changed polygon has a changed region around its edge, which starts in a split cube or next to it.
     dirty_[b] = widened<1>([&](int x, int y, int z) -> const BlockMask* {
-      const std::int32_t there = neighbours[static_cast<std::size_t>(neighbour_slot(x, y, z))];
-      return there < 0 ? nullptr : &split_cells_[static_cast<std::size_t>(there)];
+      const std::int32_t there = neighbours[neighbour_slot(x, y, z)];
+      return there < 0 ? nullptr : &split_cells_[there];
     });
     for (std::size_t word = 0; word < 8; ++word) changed_[b][word] |= dirty_[b][word];
   });

@@ -18,23 +18,22 @@ namespace {
 using Eigen::Vector3d;
 using shell_kernels::Planes;
 
-/// Heights of prisms in voxels, but for the tolerance itself. Where prisms are low there is less to look at,
-/// and small triangles have no high ones. Neighbours may have prisms of different heights: on the wall
-/// between them each line meets S once in either.
+/// Heights of prisms in voxels, in addition to the tolerance. Low prisms contain less to examine, and small
+/// triangles admit no high ones. Adjacent prisms may differ in height: each line of their wall intersects S
+/// once in either.
 constexpr double kFirst = 0.5, kLow = 0.125;
 
-/// What keeps within this cosine, of a little less than 45 degrees, of one direction keeps within a right
-/// angle of each other.
+/// The cosine of slightly less than 45 degrees: directions that near to a common one are within 90 degrees of
+/// each other.
 constexpr double kUpright = 0.7072;
-static_assert(2 * kUpright * kUpright - 1 > 0,
-              "the cosine of twice the angle is that of less than a right angle");
+static_assert(2 * kUpright * kUpright - 1 > 0, "the cosine of twice the angle is positive");
 
-/// What single precision may make of places a few blocks away from the one that they are relative to, in
-/// voxels, and far more.
+/// Far more than the rounding of single precision for positions a few blocks away from the base, in voxels.
 constexpr float kSingleRounding = 1e-4f;
 
-/// The planes of a prism for the kernels, relative to a place. A wall is ruled between two pillars that may
-/// lean differently: its plane leans as their mean, and `spread` is how far the wall is off that at most.
+/// Returns the planes of a prism for the kernels, relative to `base`. A wall is ruled between two pillars
+/// that may lean differently: its plane leans as their mean, and `spread` is the largest distance of the wall
+/// from it.
 Planes planes_of(const ShellPrism& prism, const Vector3d& base) {
   Planes planes;
   const auto set = [&](int plane, const Vector3d& normal, double offset) {
@@ -43,7 +42,7 @@ Planes planes_of(const ShellPrism& prism, const Vector3d& base) {
   };
   const auto& [axes, origin, offsets] = prism.over().frame();
   for (int side = 0; side < 3; ++side) {
-    const auto& [first, second] = prism.leans()[static_cast<std::size_t>(side)];
+    const auto& [first, second] = prism.leans()[side];
     const double lean = (first + second) / 2, length = std::sqrt(1 + lean * lean);
     const Vector3d normal = (axes.row(side) - lean * axes.row(3)).transpose() / length;
     set(side, normal, normal.dot(origin) + (offsets[side] - lean * offsets[3]) / length);
@@ -57,16 +56,16 @@ Planes planes_of(const ShellPrism& prism, const Vector3d& base) {
 
 }  // namespace
 
-/// What a thread keeps from one polygon to the next, so that little is allocated.
+/// Memory that a thread reuses for all polygons.
 struct RegionShell::Buffers {
   std::vector<shell_kernels::Window> windows;  ///< parts of blocks that may reach into the prisms
   std::vector<Triangle> fans;                  ///< triangles of fanned edges in the windows
   std::vector<ShellPrism> prisms;
   std::vector<shell_kernels::Candidate> candidates;
-  std::vector<std::uint16_t> certain;  ///< one for each point of S
+  std::vector<std::uint16_t> certain;  ///< one per vertex of S
 };
 
-/// The question whether one polygon holds.
+/// The proof of one polygon.
 class RegionShell::Search {
  public:
   Search(const RegionShell& shell, const RegionPolygon& polygon, Buffers& buffers);
@@ -75,11 +74,11 @@ class RegionShell::Search {
  private:
   using Found = shell_kernels::Found;
   static constexpr std::size_t kMostTriangles = shell_kernels::kMostPrisms;  ///< one or two a polygon
-  /// What is found about the triangles of the polygon that are open.
+  /// Result for the open triangles of the polygon.
   struct Answer {
-    unsigned shown;  ///< a bit each; nothing is, unless S is there
-    bool is_there;   ///< S has been found in the prism of one of them
-    bool never;      ///< the polygon cannot be shown to hold
+    unsigned shown;  ///< one bit each; valid only if S is there
+    bool is_there;   ///< S was found in the prism of one of them
+    bool never;      ///< the polygon cannot be proved
   };
 
   bool starts_at_borders() const;
@@ -103,24 +102,23 @@ class RegionShell::Search {
   double tolerance_of(const Triangle& t) const {
     return double(std::min({shell_.tolerance_[t[0]], shell_.tolerance_[t[1]], shell_.tolerance_[t[2]]}));
   }
-  /// Calls f(Triangle) for those that the polygon's crossing edge has in S.
+  /// Calls f(Triangle) for the triangles of S at the polygon's crossed edge.
   template <class F>
   void for_each_triangle_of_edge(F&& f) const;
-  /// Calls f(triangle, prism, between) for those that the kernels do not show to be good.
+  /// Calls f(triangle, prism, between) for the triangles of S not proved by the kernels.
   template <class F>
   void for_each_near(const Found& found, F&& f) const;
 
   const RegionShell& shell_;
   const RegionPolygon& polygon_;
   Buffers& buffers_;
-  Vector3d base_;                            ///< near the polygon: what single precision is relative to
-  std::array<Vector3d, 4> pillars_;          ///< one for each of the polygon's corners
-  std::array<shell_kernels::Box, 4> cubes_;  ///< the polygon's regions
-  double highest_;                           ///< height of the highest prism
-  std::array<std::array<int, 3>, kMostTriangles>
-      open_;  ///< triangles that are not shown yet, by their corners
+  Vector3d base_;                                        ///< near the polygon: the origin of single precision
+  std::array<Vector3d, 4> pillars_;                      ///< one for each of the polygon's corners
+  std::array<shell_kernels::Box, 4> cubes_;              ///< the polygon's regions
+  double highest_;                                       ///< height of the highest prism
+  std::array<std::array<int, 3>, kMostTriangles> open_;  ///< triangles not yet proved, by their corners
   std::size_t open_count_ = 0;
-  // Of the prisms that stand now, over some of these triangles:
+  // Of the current prisms, over some of these triangles:
   double height_ = 0;
   bool is_lowest_ = false;
   std::array<std::size_t, kMostTriangles> triangle_of_;
@@ -139,17 +137,16 @@ RegionShell::RegionShell(const CellRegions& regions, const EdgePolygons& polygon
       up_(cells_.size()),
       buffers_([&polygons] {
         auto buffers = std::make_unique<Buffers>();
-        // As large as S has points. A search writes it for the points of its windows; what it reads of others
-        // is left over from before, and of no matter (find_candidates()).
+        // One entry per vertex of S. A search writes those of its windows; it ignores the outdated values of
+        // others (find_candidates()).
         buffers->certain.resize(polygons.point_count() + shell_kernels::kLargestVector);
         return buffers;
       }) {
-  // Count, scan, fill: S is laid out for the kernels once, in single precision and by blocks.
+  // Count, scan, fill: S in single precision and by blocks, for the kernels.
   std::vector<std::uint64_t> first(cells_.size());
   for (std::size_t b = 0; b < first.size(); ++b)
     for (std::size_t axis = 0; axis < 3; ++axis)
-      for (std::size_t x = 0; x < 8; ++x)
-        first[b] += static_cast<std::uint64_t>(std::popcount(quads_in(b, axis, x)));
+      for (std::size_t x = 0; x < 8; ++x) first[b] += std::popcount(quads_in(b, axis, x));
   quads_.resize(exclusive_scan(first, "edge crossings"));
   upright_.resize(quads_.size());
   for (LargeArray<float>& coordinates : in_blocks_)
@@ -178,12 +175,11 @@ void RegionShell::describe(std::size_t b, std::uint32_t first_quad) {
     described.without_quad[axis] = polygons_.fanned(block, static_cast<int>(axis)).data();
   }
   described.first_quad = first_quad;
-  // Relative to the block's corner, so that single precision does anywhere in the lattice.
+  // Relative to the block's corner, so that single precision suffices anywhere in the lattice.
   const Vector3d corner = cells_.corner(block, 0);
   for (std::uint32_t point = own.first_point; point < own.first_point + points; ++point)
     for (std::size_t a = 0; a < 3; ++a)
-      in_blocks_[a][point] =
-          static_cast<float>(points_[point][static_cast<int>(a)] - corner[static_cast<int>(a)]);
+      in_blocks_[a][point] = static_cast<float>(points_[point][a] - corner[a]);
 
   PlainPoints near;
   near.read(cells_, block);
@@ -191,7 +187,7 @@ void RegionShell::describe(std::size_t b, std::uint32_t first_quad) {
   for (std::size_t x = 0; x < 8; ++x) {
     described.quads_before[x] = static_cast<std::uint16_t>(number - first_quad);
     const std::uint64_t of_axis[3] = {quads_in(b, 0, x), quads_in(b, 1, x), quads_in(b, 2, x)};
-    // By sample and then by axis, so that the quads of a row of samples follow one another.
+    // By sample and then by axis, so that the quads of a row of samples are consecutive.
     for (std::uint64_t bits = of_axis[0] | of_axis[1] | of_axis[2]; bits != 0; bits &= bits - 1)
       for (int axis = 0; axis < 3; ++axis)
         if (of_axis[axis] & bits & -bits)
@@ -202,8 +198,8 @@ void RegionShell::describe(std::size_t b, std::uint32_t first_quad) {
   find_upright(b, first_quad, number);
 }
 
-/// Marks the quads whose triangles lie within kUpright of their block's mean normal. Where a prism's pillars
-/// do, too, such a quad faces up in the prism without being looked at.
+/// Marks the quads whose triangles lie within kUpright of their block's mean normal. If a prism's pillars do,
+/// too, such a quad certainly faces up in the prism.
 void RegionShell::find_upright(std::size_t block, std::uint32_t first, std::uint32_t end) {
   std::vector<Vector3d> normals;  // of both triangles of each
   normals.reserve(2 * (end - first));
@@ -236,11 +232,11 @@ RegionShell::Search::Search(const RegionShell& shell, const RegionPolygon& polyg
       highest_(kFarthest) {
   for (int i = 0; i < polygon.corners; ++i) {
     const Region& region = polygon.regions[i];
-    // The least tolerance of the polygon's regions: a prism higher than that would show too little.
+    // A prism higher than the least tolerance of the polygon's regions would prove too little.
     highest_ = std::min(highest_, double(shell_.regions_.tolerance(region)));
-    pillars_[static_cast<std::size_t>(i)] = shell_.regions_.normal(region);
+    pillars_[i] = shell_.regions_.normal(region);
     const Vector3d lower = shell_.cells_.corner(region.block, region.cell) - base_;
-    shell_kernels::Box& cube = cubes_[static_cast<std::size_t>(i)];
+    shell_kernels::Box& cube = cubes_[i];
     for (int a = 0; a < 3; ++a) {
       cube.lower[a] = static_cast<float>(lower[a]);
       cube.upper[a] = static_cast<float>(lower[a] + region.side());
@@ -249,16 +245,16 @@ RegionShell::Search::Search(const RegionShell& shell, const RegionPolygon& polyg
   polygon.for_each_triangle([&](int a, int b, int c) { open_[open_count_++] = {a, b, c}; });
 }
 
-/// Tries prisms of a middle height, then as high as allowed, then the lowest: each time over those triangles
-/// that are not shown yet. What fails at one height may hold at another: low prisms reach what is near alone,
-/// high ones reach S where it is far.
+/// Tries prisms of a medium height, of the largest one, and then the lowest, each over the triangles not yet
+/// proved. Low prisms contain only nearby parts of S, and high ones reach S where it is far.
 bool RegionShell::Search::run() {
   if (!starts_at_borders()) return false;
-  // S is in a prism, and by their common wall in the other triangle's, if that is no lower.
+  // If S is in a prism, it is also in that of the other triangle, through their common wall, if that is no
+  // lower.
   double found_at = std::numeric_limits<double>::infinity(), before = 0;
   const double lowest = std::min(kLow, highest_);
   for (const double height : {std::min(kFirst, highest_), highest_, lowest}) {
-    // Where the tolerance is small, two of the heights are the same.
+    // With a small tolerance, two of the heights are equal.
     if (std::exchange(before, height) == height) continue;
     height_ = height;
     is_lowest_ = height == lowest;
@@ -276,9 +272,9 @@ bool RegionShell::Search::run() {
   return false;
 }
 
-/// Whether S goes on into the prisms at sides between two cells that are alone (the last point of the
-/// header): the triangles of S beside these sides, at the polygon's own crossing edge, face up along the
-/// pillars at their ends; so they are on the polygon's side of the wall there.
+/// Returns true if S continues into the prisms at sides between two single cells (the last condition of the
+/// header): the triangles of S at these sides and at the polygon's crossed edge face up along the pillars at
+/// their ends, so they are on the polygon's side of the wall there.
 bool RegionShell::Search::starts_at_borders() const {
   for (int i = 0; i < polygon_.corners; ++i) {
     const int j = polygon_.next(i);
@@ -290,8 +286,7 @@ bool RegionShell::Search::starts_at_borders() const {
     for_each_triangle_of_edge([&](const Triangle& t) {
       if (std::ranges::count(t, p) + std::ranges::count(t, q) < 2) return;
       const Vector3d normal = normal_of(t);
-      starts = normal.dot(pillars_[static_cast<std::size_t>(i)]) > 0 &&
-               normal.dot(pillars_[static_cast<std::size_t>(j)]) > 0;
+      starts = normal.dot(pillars_[i]) > 0 && normal.dot(pillars_[j]) > 0;
     });
     if (!starts) return false;
   }
@@ -307,20 +302,18 @@ void RegionShell::Search::for_each_triangle_of_edge(F&& f) const {
   shell_.polygons_.polygons_of(polygon_.crossing, halves, f);
 }
 
-/// Gathers the parts of blocks that the prisms may reach into. Points of S lie in their cells, so a triangle
-/// that reaches there belongs to an edge of one of the cells there.
+/// Collects the parts of blocks that the prisms may extend into. Vertices of S lie in their cells, so a
+/// triangle that extends into a cell belongs to an edge of it.
 void RegionShell::Search::gather() {
   buffers_.windows.clear();
   buffers_.fans.clear();
   Eigen::AlignedBox3d box;
   polygon_.for_each_triangle([&](int a, int b, int c) {
     for (const int corner : {a, b, c})
-      for (const double up : {height_, -height_})
-        box.extend(polygon_.points[static_cast<std::size_t>(corner)] +
-                   up * pillars_[static_cast<std::size_t>(corner)]);
+      for (const double up : {height_, -height_}) box.extend(polygon_.points[corner] + up * pillars_[corner]);
   });
   const Vector3d lower = box.min() - base_, upper = box.max() - base_;
-  // Edges that touch a cell that the prisms may reach into, and all cells that touch these; from the base.
+  // Edges of cells that the prisms may extend into, and all cells around these; from the base.
   int from[3], to[3], first_step[3], last_step[3];  // steps in blocks
   for (int a = 0; a < 3; ++a) {
     from[a] = static_cast<int>(std::floor(lower[a] - ShellPrism::kRounding));
@@ -334,26 +327,25 @@ void RegionShell::Search::gather() {
   for (int x = first_step[0]; x <= last_step[0]; ++x)
     for (int y = first_step[1]; y <= last_step[1]; ++y)
       for (int z = first_step[2]; z <= last_step[2]; ++z) {
-        // The regions' blocks are all those around the polygon's edge, so one of them is next to it.
+        // The regions' blocks are all those around the polygon's edge, so the block is next to one of them.
         const int steps[3] = {x, y, z};
         for (int i = 0; i < polygon_.corners; ++i) {
           int step[3];
           for (std::size_t a = 0; a < 3; ++a)
             step[a] = steps[a] - (source_of(i).lower[a] - source_of(0).lower[a]) / 8;
           if (std::ranges::any_of(step, [](int by) { return by < -1 || by > 1; })) continue;
-          const std::int32_t block =
-              source_of(i).neighbours[static_cast<std::size_t>(neighbour_slot(step[0], step[1], step[2]))];
+          const std::int32_t block = source_of(i).neighbours[neighbour_slot(step[0], step[1], step[2])];
           if (block >= 0) gather(block, {8 * x, 8 * y, 8 * z}, from, to);
           break;
         }
       }
-  // The kernels want windows ascending (tell_points()).
+  // The kernels require ascending windows (tell_points()).
   std::ranges::sort(buffers_.windows, {},
                     [](const shell_kernels::Window& window) { return window.block->cells->first_point; });
 }
 
-/// Adds the part of a block whose corner is at `corner` from the base, and its fans, which the kernels do not
-/// know.
+/// Adds the part of a block with its corner at `corner` from the base, and its fans, which the kernels do not
+/// cover.
 void RegionShell::Search::gather(std::int32_t block, const std::array<int, 3>& corner, const int (&from)[3],
                                  const int (&to)[3]) {
   const auto part_from = [&](int below) {
@@ -364,12 +356,12 @@ void RegionShell::Search::gather(std::int32_t block, const std::array<int, 3>& c
       if (first[a] >= end[a]) return shell_kernels::Window::Part{};
     }
     const std::uint64_t row = (1u << end[2]) - (1u << first[2]);
-    // A row for each y, by a product: bits 0, 8, 16 and so on, as many as there are.
+    // A row for each y, by a product with bits 0, 8, 16 and so on.
     const std::uint64_t rows = row * (0x0101010101010101u >> (8 * (8 - (end[1] - first[1]))))
                                << (8 * first[1]);
     return shell_kernels::Window::Part{rows, first[0], end[0]};
   };
-  const shell_kernels::Block& described = shell_.blocks_[static_cast<std::size_t>(block)];
+  const shell_kernels::Block& described = shell_.blocks_[block];
   const shell_kernels::Window window{
       &described, {float(corner[0]), float(corner[1]), float(corner[2])}, part_from(1), part_from(0), 0};
   buffers_.windows.push_back(window);
@@ -382,17 +374,17 @@ void RegionShell::Search::gather(std::int32_t block, const std::array<int, 3>& c
             [&](const Triangle& t) { buffers_.fans.push_back(t); });
 }
 
-/// Stands prisms over the open triangles and looks at S in them. `is_there` says that S is known to be there.
+/// Builds prisms over the open triangles and examines S in them. `is_there`: S is known to be in one of them.
 RegionShell::Search::Answer RegionShell::Search::look(bool is_there) {
   constexpr Answer kNever{.shown = 0, .is_there = false, .never = true};
   if (!stand_prisms()) return kNever;
   const std::size_t prisms = buffers_.prisms.size();
   if (prisms == 0) return {.shown = 0, .is_there = is_there, .never = false};
-  // Then no triangle of S need be asked for its own tolerance.
+  // If so, the tolerances of single triangles of S need no test.
   const bool tolerated = double(shell_.least_tolerance_) >= height_;
   note_what_faces_up(tolerated);
   const Found found = scan();
-  // What is farther than the tolerance here is not nearer in a lower prism.
+  // A point farther than the tolerance is not nearer in a lower prism.
   if (found.beyond && height_ == highest_) return kNever;
   const unsigned bad = find_bad(found, tolerated);
   if (bad != 0 && is_lowest_) return kNever;
@@ -408,13 +400,14 @@ RegionShell::Search::Answer RegionShell::Search::look(bool is_there) {
   return answer;
 }
 
-/// Stands prisms over the open triangles; false if one cannot stand at any height, for the lowest stand best.
+/// Builds prisms over the open triangles. Returns false if one is invalid at the lowest height, and so at
+/// any.
 bool RegionShell::Search::stand_prisms() {
   std::vector<ShellPrism>& prisms = buffers_.prisms;
   prisms.clear();
   for (std::size_t i = 0; i < open_count_; ++i) {
     const auto& [a, b, c] = open_[i];
-    const auto pillar = [&](int corner) { return pillars_[static_cast<std::size_t>(corner)]; };
+    const auto pillar = [&](int corner) { return pillars_[corner]; };
     prisms.emplace_back(Corners{polygon_.points[a], polygon_.points[b], polygon_.points[c]},
                         std::array{pillar(a), pillar(b), pillar(c)}, height_);
     if (!prisms.back().stands()) {
@@ -428,11 +421,11 @@ bool RegionShell::Search::stand_prisms() {
   return true;
 }
 
-/// Notes for each window in which prisms its upright quads face up. `tolerated`: every triangle of S may be
-/// as far away as the prisms are high; if not, none is left out.
+/// Records for each window in which prisms its upright quads face up. `tolerated`: every triangle of S may be
+/// as far away as the height of the prisms; if false, none is recorded.
 void RegionShell::Search::note_what_faces_up(bool tolerated) {
   for (shell_kernels::Window& window : buffers_.windows) {
-    const Vector3d& up = shell_.up_[static_cast<std::size_t>(window.block - shell_.blocks_.data())];
+    const Vector3d& up = shell_.up_[window.block - shell_.blocks_.data()];
     window.facing = 0;
     for (std::size_t p = 0; p < buffers_.prisms.size() && tolerated; ++p)
       if (std::ranges::all_of(buffers_.prisms[p].pillars(),
@@ -441,8 +434,8 @@ void RegionShell::Search::note_what_faces_up(bool tolerated) {
   }
 }
 
-/// Lets the kernels tell which triangles of S may be in a prism. No exact number is needed where points keep
-/// off the prisms' planes: single precision tells these, and what is uncertain is looked at in double.
+/// Finds the triangles of S that may be in a prism, by the kernels. Single precision suffices for vertices
+/// off the prisms' planes; uncertain ones are tested in double precision.
 shell_kernels::Found RegionShell::Search::scan() {
   buffers_.candidates.resize(std::max(buffers_.candidates.size(), 3 * 512 * buffers_.windows.size()));
   const shell_kernels::Surface surface{
@@ -464,7 +457,7 @@ void RegionShell::Search::for_each_near(const Found& found, F&& f) const {
     }
   };
   for (int i = 0; i < found.candidates; ++i) {
-    const shell_kernels::Candidate& candidate = buffers_.candidates[static_cast<std::size_t>(i)];
+    const shell_kernels::Candidate& candidate = buffers_.candidates[i];
     const Quad& q = shell_.quads_[candidate.quad];
     in_each({q[0], q[1], q[2]}, candidate.near[0], candidate.between[0]);
     in_each({q[0], q[2], q[3]}, candidate.near[1], candidate.between[1]);
@@ -472,11 +465,12 @@ void RegionShell::Search::for_each_near(const Found& found, F&& f) const {
   for (const Triangle& t : buffers_.fans) in_each(t, (1u << buffers_.prisms.size()) - 1, 0);
 }
 
-/// The prisms, a bit each, that S does not pass through as it should; of the lowest ones, some of them.
+/// Returns the prisms, one bit each, that S does not pass through as required; of the lowest ones, at least
+/// one.
 unsigned RegionShell::Search::find_bad(const Found& found, bool tolerated) const {
   const auto is_good = [&](const Triangle& t, const ShellPrism& prism, bool between) {
-    // Between lid and bottom and facing up along all pillars is good wherever it lies; meet() would say so,
-    // too, but takes longer.
+    // A triangle between lid and bottom that faces up along all pillars is good anywhere; meet() would be
+    // slower.
     if (between && (tolerated || tolerance_of(t) >= height_)) {
       const Vector3d normal = normal_of(t);
       if (std::ranges::all_of(prism.pillars(), [&](const Vector3d& up) { return normal.dot(up) > 0; }))
@@ -486,14 +480,15 @@ unsigned RegionShell::Search::find_bad(const Found& found, bool tolerated) const
   };
   unsigned bad = 0;
   for_each_near(found, [&](const Triangle& t, std::size_t p, bool between) {
-    // Which prisms fail matters only if the others may still be shown; of the lowest ones one is enough.
+    // One of the lowest prisms is sufficient, because a failure there is final.
     const bool is_known = ((bad >> p) & 1) || (bad != 0 && is_lowest_);
     if (!is_known && !is_good(t, buffers_.prisms[p], between)) bad |= 1u << p;
   });
   return bad;
 }
 
-/// Whether a triangle of S is in one of these prisms, a bit each, although no point of it certainly is.
+/// Returns true if a triangle of S is in one of these prisms, one bit each, although no vertex of it
+/// certainly is.
 bool RegionShell::Search::has_witness(unsigned prisms) {
   bool found_one = false;
   const auto look_at = [&](const Triangle& t, std::size_t p) {
@@ -503,7 +498,7 @@ bool RegionShell::Search::has_witness(unsigned prisms) {
     for (std::size_t p = 0; p < buffers_.prisms.size(); ++p) look_at(t, p);
   });
   if (found_one) return true;
-  // What faces up and lies between lid and bottom is good, and was left out by the kernels; here all count.
+  // Including the good triangles that the kernels have omitted.
   note_what_faces_up(false);
   const Found found = scan();
   for_each_near(found, [&](const Triangle& t, std::size_t p, bool) { look_at(t, p); });
@@ -515,16 +510,18 @@ bool RegionShell::Search::is_witness(const Triangle& t, const ShellPrism& prism)
          reaches_into(prism, corners_of(t));
 }
 
-/// Whether one of the points is that of a cell of the polygon's regions: points lie in their cells.
+/// Returns true if one of the vertices belongs to a cell of the polygon's regions: vertices lie in their
+/// cells.
 bool RegionShell::Search::is_own(const Corners& points) const {
   return std::ranges::any_of(points, [&](const Vector3d& p) {
     const Vector3d place = p - base_;
-    return std::any_of(cubes_.begin(), cubes_.begin() + polygon_.corners,
-                       [&](const shell_kernels::Box& cube) {
-                         for (int a = 0; a < 3; ++a)
-                           if (!(place[a] > cube.lower[a] && place[a] < cube.upper[a])) return false;
-                         return true;
-                       });
+    for (int i = 0; i < polygon_.corners; ++i) {
+      const auto& [lower, upper] = cubes_[i];
+      if (place[0] > lower[0] && place[0] < upper[0] && place[1] > lower[1] && place[1] < upper[1] &&
+          place[2] > lower[2] && place[2] < upper[2])
+        return true;
+    }
+    return false;
   });
 }
 

@@ -1,4 +1,4 @@
-// Whether a merged polygon is near the uniform mesh, and that near it.
+// The distance between a merged mesh and the uniform mesh for small tolerances.
 #pragma once
 
 #include <tbb/enumerable_thread_specific.h>
@@ -23,50 +23,51 @@
 
 namespace hermesh {
 
-/// A shell about merged polygons T, which proves for tolerances of up to kFarthest that they are near the
-/// uniform mesh S and that S is near them (after Jiang et al. 2020).
+/// A shell around merged polygons T, which proves for tolerances of up to kFarthest that T and the uniform
+/// mesh S are near each other (after Jiang et al. 2020).
 ///
-/// Each point of T has a pillar, a unit direction: a region's is the mean of its crossings' normals. Between
-/// the corners of a triangle directions are interpolated; over each triangle stands a prism, as far up and
-/// down its pillars as the tolerance, and prisms of neighbours share a wall. It is shown that
-///   - pillars rise over their triangles and neither meet nor cross, so that a place in a prism lies on one
-///     line of it;
-///   - all triangles of S that reach into a prism (by 1e-6 voxel or more) face up along its pillars, and
-///     stay between its lid and its bottom;
-///   - S is there, a triangle of one of the cells that the polygon's regions are made of;
-///   - at sides between two cells that are alone, beyond which T may be S, S goes on into the prism: else it
-///     could bulge out between T and the place where the lines of the prism meet it.
-/// Then every line of a prism meets S once. Never twice, for S would have to face down in between; and at
-/// all, because the lines that do are an open and a closed set: S has no border, and leaves by the walls
-/// alone. So each point of T has one of S no farther away than the tolerance. And as S comes to T's
-/// neighbours' prisms through the walls, all of it is in prisms: each point of S has one of T no farther
-/// away. Where no cell is merged T is S, and the point that a line meets is its own.
+/// Each vertex of T has a pillar, a unit direction: the mean of the normals of its region's crossings. Within
+/// a triangle, directions are interpolated between the corners. Over each triangle there is a prism, which
+/// extends up and down along its pillars by the tolerance; prisms of adjacent triangles share a wall. The
+/// proof establishes that
+///   - pillars rise over their triangles and neither meet nor cross, so that each point of a prism lies on
+///   one line of it;
+///   - all triangles of S that extend into a prism (by 1e-6 voxel or more) face up along its pillars, and
+///   stay between its lid and its bottom;
+///   - S is in it, with a triangle of one of the cells of the polygon's regions;
+///   - at sides between two single cells, beyond which T may be S, S continues into the prism: otherwise it
+///   could bulge out between T and its intersection with the lines of the prism.
+/// Then every line of a prism intersects S exactly once. Not twice, because S would have to face down in
+/// between; and at least once, because the lines that do form an open and closed set: S has no boundary, and
+/// leaves through the walls only. So each point of T has a point of S within the tolerance. As S enters the
+/// adjacent prisms through the walls, all of it is in prisms, and each point of S has one of T within the
+/// tolerance. Where no cell is merged, T is S, and the point on a line is its own.
 class RegionShell {
  public:
-  /// The largest distance that can be shown, whatever the tolerance, in voxels.
+  /// The largest distance that can be proved, whatever the tolerance, in voxels.
   static constexpr double kFarthest = 2.0;
 
-  /// Describes the uniform mesh for the search. All arguments by reference but `context` must outlive this,
-  /// as must what `tolerance` refers to.
-  /// @param regions the cubes as they are when holds() is called
+  /// Prepares the uniform mesh for the search. All arguments by reference except `context`, and the data of
+  /// `tolerance`, must outlive this.
+  /// @param regions the cubes at the time of each call of holds()
   /// @param polygons of the uniform mesh
   /// @param points of the uniform mesh
-  /// @param tolerance by point, those on fanned edges included; voxels
-  /// @param context asked whether to stop
+  /// @param tolerance by vertex, including those of fanned edges; voxels
+  /// @param context receives the request to cancel
   /// @throws Cancelled
   RegionShell(const CellRegions& regions, const EdgePolygons& polygons, const UniformPoints& points,
               std::span<const float> tolerance, RunContext& context);
   ~RegionShell();
 
-  /// Whether a merged polygon is proved. Safe to call for several polygons at once.
+  /// Returns true if a merged polygon is proved. Safe to call concurrently.
   bool holds(const RegionPolygon& polygon) const;
 
  private:
   class Search;
   struct Buffers;
 
-  /// The crossing edges with a quad, a bit each, of an axis in a layer of a block.
-  std::uint64_t quads_in(std::size_t block, std::size_t axis, std::size_t layer) const;
+  /// Returns the crossed edges with a quad of an axis in one word of a block.
+  std::uint64_t quads_in(std::size_t block, std::size_t axis, std::size_t word) const;
   void describe(std::size_t block, std::uint32_t first_quad);
   void find_upright(std::size_t block, std::uint32_t first_quad, std::uint32_t end);
 
@@ -78,10 +79,10 @@ class RegionShell {
   float least_tolerance_;
   std::vector<shell_kernels::Block> blocks_;
   std::vector<Eigen::Vector3d> up_;   ///< mean normal of each block's quads
-  LargeArray<Quad> quads_;            ///< in the order of block, sample and axis; as EdgePolygons cuts them
+  LargeArray<Quad> quads_;            ///< by block, sample and axis; as cut by EdgePolygons
   LargeArray<std::uint8_t> upright_;  ///< 1 for quads that face up along their block's direction
   std::array<LargeArray<float>, 3>
-      in_blocks_;  ///< coordinates of the cells' points, relative to the corners of their blocks
+      in_blocks_;  ///< the cells' vertices, relative to the corners of their blocks
   const shell_kernels::Kernels& kernels_ = chosen_kernels<shell_kernels::Kernels>();
   mutable tbb::enumerable_thread_specific<std::unique_ptr<Buffers>> buffers_;
 };

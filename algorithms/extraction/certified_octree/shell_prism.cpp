@@ -9,7 +9,7 @@ namespace {
 
 using Eigen::Vector3d;
 
-/// The least cosine of the angle between a pillar and the normal of a triangle at its foot.
+/// Least cosine of the angle between a pillar and the normal of a triangle at its foot.
 constexpr double kLeastPillarCosine = 0.3;
 
 constexpr double kPrismRounding = ShellPrism::kRounding;
@@ -17,15 +17,15 @@ using Places = std::array<OverTriangle::Place, 3>;
 
 enum class Walls { outer, inner };
 
-/// Between which heights a triangle lies in a prism; nowhere if the first is the greater one.
+/// The range of heights of a triangle within a prism; empty if the first is the greater one.
 struct Heights {
   double lowest = 1, highest = -1;
   bool empty() const { return lowest > highest; }
 };
 
-/// Where a triangle lies in the prism that is as wide, or as narrow, as the leans of a side's two pillars
-/// allow at each height: above the triangle's plane that is one plane, below it another. What reaches less
-/// than kPrismRounding into it is not there.
+/// Returns the heights of a triangle in the prism that is as wide, or as narrow, as the leans of a side's two
+/// pillars allow at each height: each wall is then one plane above the triangle's plane and another below.
+/// Parts less than kPrismRounding deep do not count.
 Heights heights_in(const ShellPrism& prism, const Places& triangle, Walls walls) {
   Heights heights;
   for (const double up : {1.0, -1.0}) {
@@ -33,8 +33,8 @@ Heights heights_in(const ShellPrism& prism, const Places& triangle, Walls walls)
     for (std::size_t side = 0; side < 3; ++side) {
       const auto [least, most] = std::minmax(prism.leans()[side][0], prism.leans()[side][1]);
       const double lean = (walls == Walls::outer) == (up > 0) ? most : least;
-      // Skewed by the lean, the wall stands upright and the triangle can be clipped as over a flat one.
-      for (auto& place : places) place[static_cast<int>(side)] += kPrismRounding - lean * place[3];
+      // Sheared by the lean, the wall is upright and the triangle can be clipped as over a triangle.
+      for (auto& place : places) place[side] += kPrismRounding - lean * place[3];
     }
     const ClippedTriangle part(places);
     double nearest = prism.height(), farthest = -1;
@@ -74,16 +74,16 @@ ShellPrism::ShellPrism(const Corners& corners, const std::array<Vector3d, 3>& pi
 }
 
 double ShellPrism::beyond_wall(const OverTriangle::Place& place, std::size_t side) const {
-  return place[static_cast<int>(side)] - std::max(leans_[side][0] * place[3], leans_[side][1] * place[3]);
+  return place[side] - std::max(leans_[side][0] * place[3], leans_[side][1] * place[3]);
 }
 
 double ShellPrism::lean(const Vector3d& pillar, std::size_t side) const {
   return over_.frame().axes.row(static_cast<int>(side)).dot(pillar) / pillar.dot(over_.normal());
 }
 
-/// Whether the map from a point of the triangle and a height to a place turns nothing over: the triangle that
-/// the pillars make at any height faces up along each of them. This is a quadratic function of the height,
-/// bounded by its coefficients.
+/// Returns true if the map from points of the triangle and heights to space inverts nothing: the triangle
+/// formed by the pillars at any height faces up along each of them. This is a quadratic function of the
+/// height, bounded by its coefficients.
 bool ShellPrism::is_unfolded(const Corners& corners) const {
   const Vector3d e = corners[1] - corners[0], f = corners[2] - corners[0];
   const Vector3d de = pillars_[1] - pillars_[0], df = pillars_[2] - pillars_[0];
@@ -95,7 +95,7 @@ bool ShellPrism::is_unfolded(const Corners& corners) const {
   });
 }
 
-/// Whether no pillar leans over the wall opposite.
+/// Returns true if no pillar leans over the opposite wall.
 bool ShellPrism::keeps_its_corners(const Corners& corners) const {
   for (std::size_t i = 0; i < 3; ++i)
     for (const double up : {height_, -height_})
@@ -104,22 +104,22 @@ bool ShellPrism::keeps_its_corners(const Corners& corners) const {
 }
 
 ShellPrism::Plane ShellPrism::through(const Corners& corners, double up) const {
-  // Eigen's planes face those that see the points clockwise.
+  // Eigen's planes face the side from which the points are clockwise.
   return Plane::Through(corners[0] + up * pillars_[0], corners[2] + up * pillars_[2],
                         corners[1] + up * pillars_[1]);
 }
 
 Meeting meet(const ShellPrism& prism, const Corners& triangle, double tolerance) {
-  // Boxes rule out most triangles, planes most others; only the rest is clipped.
+  // Boxes exclude most triangles, planes most others; only the rest is clipped.
   const Vector3d lowest = triangle[0].cwiseMin(triangle[1]).cwiseMin(triangle[2]);
   const Vector3d highest = triangle[0].cwiseMax(triangle[1]).cwiseMax(triangle[2]);
   if ((lowest.array() > prism.box().max().array() + kPrismRounding).any() ||
       (highest.array() < prism.box().min().array() - kPrismRounding).any())
     return Meeting::none;
   const Places places = places_of(prism, triangle);
-  // How far the corners are beyond each wall, the lid and the bottom. All of these are concave, and so are
-  // their sums: where one is positive at all corners, it is on all of the triangle. Sums tell of what is
-  // beyond an edge of the prism.
+  // Distances of the corners beyond each wall, the lid and the bottom. They and their sums are concave: if
+  // one is positive at all corners, it is so on the whole triangle. Sums detect triangles beyond an edge of
+  // the prism.
   std::array<std::array<double, 3>, 5> beyond;
   for (std::size_t corner = 0; corner < 3; ++corner) {
     for (std::size_t side = 0; side < 3; ++side)
@@ -144,8 +144,8 @@ Meeting meet(const ShellPrism& prism, const Corners& triangle, double tolerance)
     }
   const Heights heights = heights_in(prism, places, Walls::outer);
   if (heights.empty()) return Meeting::none;
-  // Heights are measured along the normal: the lid is least_lid() of the height up at its lowest, and what is
-  // no higher than that share of the tolerance is no farther than the tolerance along any line.
+  // Heights are along the normal: the lid is at least at least_lid() of the height, and a point within that
+  // fraction of the tolerance is within the tolerance along any line.
   const double most = prism.least_lid() * std::min(prism.height(), tolerance) - kPrismRounding;
   return faces && heights.lowest >= -most && heights.highest <= most ? Meeting::good : Meeting::bad;
 }

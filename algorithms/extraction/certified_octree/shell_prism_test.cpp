@@ -10,7 +10,7 @@
 #include "algorithms/lattice/simd/simd_level.h"
 
 namespace hermesh {
-namespace {
+namespace shell_prism_test {
 
 using Eigen::Vector3d;
 
@@ -28,7 +28,7 @@ TEST(ShellPrism, StandsWherePillarsRiseAndKeepApart) {
   EXPECT_FALSE(ShellPrism(kTriangle, {-kUp, -kUp, -kUp}, 2).stands()) << "they point down";
   EXPECT_FALSE(ShellPrism({kTriangle[0], kTriangle[1], 0.5 * kTriangle[1]}, {kUp, kUp, kUp}, 2).stands())
       << "no area";
-  // Pillars that lean towards one another by 45 degrees meet 2 above the middle of the side of 4.
+  // Pillars that lean towards one another by 45 degrees meet 2 above the middle of the side of length 4.
   const std::array<Vector3d, 3> leaning = {Vector3d(1, 0, 1).normalized(), Vector3d(-1, 0, 1).normalized(),
                                            kUp};
   EXPECT_TRUE(ShellPrism(kTriangle, leaning, 1).stands());
@@ -45,7 +45,7 @@ TEST(ShellPrism, MeetsWhatPassesThroughIt) {
   EXPECT_EQ(meet(prism, raised(wide, 1.1), 1), Meeting::none) << "above the lid";
   EXPECT_EQ(meet(prism, {Vector3d(-1, 1, 0), Vector3d(-1, 1, 5), Vector3d(-2, 3, 0)}, 1), Meeting::none)
       << "beyond a wall";
-  // Through the lid over the prism's inside, and through it beyond the walls alone.
+  // Through the lid over the prism's interior, and through its plane only beyond the walls.
   EXPECT_EQ(meet(prism, {Vector3d(1, 1, 0), Vector3d(2, 1, 0), Vector3d(1, 2, 3)}, 1), Meeting::bad);
   EXPECT_EQ(meet(prism, {Vector3d(1, 1, 0), Vector3d(1, 2, 0), Vector3d(-6, 1, 5)}, 1), Meeting::good);
 }
@@ -57,8 +57,8 @@ TEST(ShellPrism, IsReachedIntoByWhatIsWithinEitherPillarsWall) {
   EXPECT_FALSE(reaches_into(prism, {Vector3d(-2, 1, 0), Vector3d(-1, 1, 0), Vector3d(-1, 2, 0)}));
 }
 
-/// The lid lies lower than the height where pillars lean: what is between the two is not in the prism, and no
-/// witness that S is.
+/// The lid is lower than the height if pillars lean: a triangle between the two is not in the prism, and does
+/// not prove that S is.
 TEST(ShellPrism, IsNotMetAboveALowLid) {
   const Vector3d leaning(0.6, 0, 0.8);
   const ShellPrism prism(kTriangle, {leaning, leaning, leaning}, 0.5);  // the lid is at 0.4
@@ -66,7 +66,7 @@ TEST(ShellPrism, IsNotMetAboveALowLid) {
   EXPECT_EQ(meet(prism, raised(kTriangle, 0.45), 1), Meeting::none);
   EXPECT_EQ(meet(prism, raised(kTriangle, 0.35), 1), Meeting::good);
   EXPECT_TRUE(reaches_into(prism, raised(kTriangle, 0.35)));
-  // Above the lid and across it beyond the first wall.
+  // Above the lid, and through its plane beyond the first wall.
   EXPECT_EQ(meet(prism, {Vector3d(1.2, -2, 0.3), Vector3d(1.9, 0.02, 0.46), Vector3d(1, 0.02, 0.46)}, 1),
             Meeting::none);
 }
@@ -84,7 +84,7 @@ shell_kernels::Planes planes(float height, float x = 0) {
   return result;
 }
 
-/// A block whose first points are those of cells along z, and which has quads.
+/// A block whose first vertices are those of cells along z, and which has quads.
 class KernelBlock {
  public:
   KernelBlock(std::vector<std::array<float, 3>> points, std::vector<std::array<std::uint32_t, 4>> quads)
@@ -102,13 +102,13 @@ class KernelBlock {
     block_.first_later = static_cast<std::uint32_t>(in_cells);
     block_.later_points = static_cast<std::uint32_t>(points.size() - in_cells);
     for (int axis = 0; axis < 3; ++axis) {
-      block_.crossing[axis] = crossing_[static_cast<std::size_t>(axis)].data();
+      block_.crossing[axis] = crossing_[axis].data();
       block_.without_quad[axis] = none_.data();
     }
   }
   void call_steep(std::size_t quad) { upright_[quad] = 0; }
 
-  /// Looks at the whole block; points between 0 and 4 along x are own ones.
+  /// Scans the whole block; vertices between 0 and 4 along x are own ones.
   shell_kernels::Found look(const std::vector<shell_kernels::Planes>& prisms, unsigned facing = 0) {
     using namespace shell_kernels;
     const Surface surface{axes_[0].data(), axes_[1].data(),
@@ -122,7 +122,7 @@ class KernelBlock {
     candidates_.resize(static_cast<std::size_t>(found.candidates));
     return found;
   }
-  /// What is certain of a point and a prism, a bit for each Certain.
+  /// Returns the certain relations of a vertex and a prism, one bit for each Certain.
   unsigned certain(std::size_t point, int prism) const {
     unsigned bits = 0;
     for (int what = 0; what < shell_kernels::kAllCertain; ++what)
@@ -163,7 +163,8 @@ TEST_P(ShellKernels, TellWhereAPointIs) {
   block.look({planes(1)});
   for (std::size_t i = 0; i < cases.size(); ++i) EXPECT_EQ(block.certain(i, 0), cases[i].second) << i;
 
-  // A wall that leans both ways is not where it seems.
+  // A wall whose pillars lean differently is within `spread` of its plane, so the relation is uncertain
+  // there.
   Planes spread = planes(1);
   spread.spread[2] = 1.5f;
   block.look({spread});
@@ -181,7 +182,7 @@ TEST_P(ShellKernels, FindOwnPointsInPrismsAndBeyond) {
   };
   expect({1, 0.5f, 0}, 3, 0);
   expect({1, 0.5f, 0.7f}, 1, 2);  // above the lower one
-  expect({3, 0.5f, 0}, 1, 0);     // beside it
+  expect({3, 0.5f, 0}, 1, 0);     // next to it
   expect({3, 0.5f, -2}, 0, 1);
   expect({-1, 0.5f, 0}, 0, 0);  // in it, but not own
 }
@@ -196,9 +197,9 @@ TEST_P(ShellKernels, FindTrianglesThatMayBeInAPrism) {
     block.look({planes(1), planes(1, -10)}, facing);
     return block.candidates();
   };
-  // Beyond both, by one wall or another.
+  // Beyond both, each by some wall.
   EXPECT_TRUE(look({3, 4, 3, 4}, 0).empty());
-  // Between the lids of the first one, where upright triangles need no look.
+  // Between the lids of the first one, where upright triangles need no test.
   const auto in_first = look({0, 1, 2, 0}, 0);
   ASSERT_EQ(in_first.size(), 1u);
   EXPECT_EQ(in_first[0].near[0], 1);
@@ -206,7 +207,7 @@ TEST_P(ShellKernels, FindTrianglesThatMayBeInAPrism) {
   EXPECT_TRUE(look({0, 1, 2, 0}, 1).empty());
   EXPECT_EQ(look({0, 1, 2, 0}, 1, false).size(), 1u);
   EXPECT_EQ(look({0, 1, 2, 0}, 2).size(), 1u);
-  // One triangle goes through the lid, the other does not.
+  // One triangle passes through the lid, the other does not.
   const auto through = look({0, 5, 2, 1}, 1);
   ASSERT_EQ(through.size(), 1u);
   EXPECT_EQ(through[0].near[0], 1);
@@ -250,5 +251,5 @@ TEST_P(ShellKernels, AgreeWithTheLowestLevel) {
 INSTANTIATE_TEST_SUITE_P(Levels, ShellKernels, testing::ValuesIn(available_simd_levels()),
                          [](const auto& level) { return std::string(name(level.param)); });
 
-}  // namespace
+}  // namespace shell_prism_test
 }  // namespace hermesh

@@ -8,8 +8,8 @@ namespace {
 
 using Eigen::Vector3d;
 
-/// What a value, divided by the lengths that it is made of, must exceed to be certain: rounding is some 1e-13
-/// for coordinates of thousands of voxels.
+/// Threshold of certainty for a value divided by the lengths that it is the product of: the rounding error is
+/// about 1e-13 for coordinates of thousands of voxels.
 constexpr double kCertain = 1e-10;
 
 struct Range {
@@ -21,7 +21,7 @@ Range along(const Vector3d& axis, const Corners& t) {
 }
 
 bool disjoint_apart(const Corners& a, const Corners& b) {
-  // From a corner of one, so that rounding is relative to the triangles' own size.
+  // Relative to a corner of one, so that rounding is relative to the triangles' own size.
   const Vector3d o = a[0];
   const Corners s = {Vector3d::Zero(), a[1] - o, a[2] - o}, t = {b[0] - o, b[1] - o, b[2] - o};
   double size = 0;
@@ -35,20 +35,22 @@ bool disjoint_apart(const Corners& a, const Corners& b) {
   const std::array<Vector3d, 3> es = {s[1] - s[0], s[2] - s[1], s[0] - s[2]};
   const std::array<Vector3d, 3> et = {t[1] - t[0], t[2] - t[1], t[0] - t[2]};
   const Vector3d ns = es[0].cross(es[1]), nt = et[0].cross(et[1]);
-  // The candidates for two triangles: both normals, and the products of a side of each. Any axis along which
-  // the ranges are apart is a proof, however it was found, so an axis that is mostly rounding does no harm.
+  // The candidate axes for two triangles: both normals, and the cross products of a side of each. Any axis
+  // along which the ranges are disjoint is a proof, so an axis that consists mostly of rounding errors is
+  // harmless.
   if (separates(ns) || separates(nt)) return true;
   for (const Vector3d& e : es)
     for (const Vector3d& f : et)
       if (separates(e.cross(f))) return true;
-  // Nearly in one plane, the products above vanish; then the sides of either within its plane decide.
+  // If the triangles are nearly in one plane, the products above vanish; then the sides of either decide,
+  // within its plane.
   for (int i = 0; i < 3; ++i)
     if (separates(ns.cross(es[i])) || separates(nt.cross(et[i]))) return true;
   return false;
 }
 
-/// Whether two wedges at the origin, that of a[0] and a[1] and that of b[0] and b[1], meet in the origin
-/// alone.
+/// Returns true if two wedges at the origin, that of a[0] and a[1] and that of b[0] and b[1], intersect only
+/// in the origin.
 bool wedges_apart(const std::array<Vector3d, 2>& a, const std::array<Vector3d, 2>& b) {
   const double size = std::max({a[0].cwiseAbs().maxCoeff(), a[1].cwiseAbs().maxCoeff(),
                                 b[0].cwiseAbs().maxCoeff(), b[1].cwiseAbs().maxCoeff()});
@@ -57,19 +59,21 @@ bool wedges_apart(const std::array<Vector3d, 2>& a, const std::array<Vector3d, 2
     return value > noise ? 1 : value < -noise ? -1 : 0;
   };
   const Vector3d na = a[0].cross(a[1]), nb = b[0].cross(b[1]);
-  // A plane that holds one wedge meets the other in the corner alone.
+  // A plane that contains one wedge intersects the other only in the corner.
   if (sign(na, b[0]) * sign(na, b[1]) > 0 || sign(nb, a[0]) * sign(nb, a[1]) > 0) return true;
-  // A plane through one side of each, with the rest of the two on either side: it holds two different rays.
+  // A plane through one side of each, with the other sides on opposite sides of it: it contains two different
+  // rays.
   for (int i = 0; i < 2; ++i)
     for (int j = 0; j < 2; ++j) {
       const Vector3d axis = a[i].cross(b[j]);
-      // Of parallel rays it is noise, and so would be every sign.
+      // For parallel rays the axis is only rounding error, and so is every sign.
       if (axis.cwiseAbs().maxCoeff() <= kCertain * a[i].cwiseAbs().maxCoeff() * b[j].cwiseAbs().maxCoeff())
         continue;
       if (sign(axis, a[1 - i]) * sign(axis, b[1 - j]) < 0) return true;
     }
-  // A plane through one side of a wedge, at right angles to it, with all of the other beyond; one ray of that
-  // may lie in the plane if it points the other way, as where a straight line passes through the corner.
+  // A plane through one side of a wedge, perpendicular to it, with all of the other wedge beyond; one ray of
+  // the other may lie in the plane if it points the opposite way, e.g. if a straight line passes through the
+  // corner.
   const auto beyond = [&](const std::array<Vector3d, 2>& w, const Vector3d& normal,
                           const std::array<Vector3d, 2>& v) {
     for (int i = 0; i < 2; ++i) {
@@ -88,14 +92,14 @@ bool wedges_apart(const std::array<Vector3d, 2>& a, const std::array<Vector3d, 2
   return beyond(a, na, b) || beyond(b, nb, a);
 }
 
-/// Whether the halves of planes that end in the line along `edge`, and hold a and b, are apart but for the
-/// line: they are unless they lie on one another.
+/// Returns true if the half-planes that end in the line along `edge`, and contain a and b, intersect only in
+/// that line, i.e. do not coincide.
 bool half_planes_apart(const Vector3d& edge, const Vector3d& a, const Vector3d& b) {
   const double size =
       std::max({edge.cwiseAbs().maxCoeff(), a.cwiseAbs().maxCoeff(), b.cwiseAbs().maxCoeff()});
   const Vector3d na = edge.cross(a), nb = edge.cross(b);
   const double noise = kCertain * size * na.cwiseAbs().maxCoeff();
-  // At an angle they share the line alone; in one plane they are apart if they lie on opposite sides of it.
+  // At an angle they share only the line; in one plane they are disjoint if they lie on opposite sides of it.
   if (std::abs(na.dot(b)) > noise) return true;
   const double across = na.dot(nb);  // negative: on opposite sides of the line
   return across < -kCertain * na.cwiseAbs().maxCoeff() * nb.cwiseAbs().maxCoeff() - 1e-300;
@@ -111,7 +115,7 @@ bool certainly_apart(const Corners& a, const Corners& b, int shared) {
 }
 
 bool certainly_apart(NamedTriangle a, NamedTriangle b) {
-  std::size_t shared = 0;  // corners, to the front in the same order in both
+  std::size_t shared = 0;  // shared corners, moved to the front in the same order in both
   for (std::size_t i = 0; i < 3; ++i)
     for (std::size_t j = shared; j < 3; ++j)
       if (a.names[i] == b.names[j]) {

@@ -1,5 +1,5 @@
-// Whether two triangles meet anywhere but in the corners that they share: a test that may say "perhaps",
-// never wrongly "no".
+// A conservative intersection test of two triangles that may share vertices: it may report an intersection
+// where there is none, but never misses one.
 #pragma once
 
 #include <Eigen/Core>
@@ -12,11 +12,11 @@ namespace hermesh {
 /// The corners of a triangle.
 using Corners = std::array<Eigen::Vector3d, 3>;
 
-/// True if it is certain that the triangles are apart, or meet only in their shared corners or their shared
+/// Returns true if the triangles certainly intersect in nothing but their shared corners or their shared
 /// edge. The first `shared` (0, 1 or 2) corners of both are the same points; other corners that happen to
-/// coincide count as contact, and so does whatever is nearer than rounding can tell (about 1e-9 of the
-/// triangles' size). By separating planes (Gottschalk et al. 1996, with the planes through a shared corner or
-/// edge as closed ones).
+/// coincide count as an intersection, as does any distance too small to distinguish from rounding (about 1e-9
+/// of the triangles' size). Uses separating planes (Gottschalk et al. 1996), which may contain the shared
+/// corner or edge.
 bool certainly_apart(const Corners& a, const Corners& b, int shared);
 
 /// A triangle whose corners have names: corners of the same name are the same point.
@@ -24,12 +24,12 @@ struct NamedTriangle {
   Triangle names;
   Corners corners;
 };
-/// Whether two triangles are certainly apart, but for what their names say that they share; false if all
-/// corners are shared.
+/// Returns true if two triangles certainly intersect in nothing but the corners with equal names; false if
+/// all corners are shared.
 bool certainly_apart(NamedTriangle a, NamedTriangle b);
 
-/// Whether two triangles of a mesh are certainly apart, but for the points that they share; false if they
-/// share all three. `points[i]` is the place of point i.
+/// Returns true if two triangles of a mesh certainly intersect in nothing but their shared vertices or edge;
+/// false if they share all three vertices. `points[i]` is the position of vertex i.
 template <class Points>
 bool certainly_apart(Triangle a, Triangle b, const Points& points) {
   const auto named = [&](const Triangle& t) {

@@ -6,7 +6,7 @@
 #include <random>
 
 namespace hermesh {
-namespace {
+namespace triangle_contact_test {
 
 using Eigen::Vector3d;
 
@@ -15,12 +15,12 @@ const Vector3d o(0, 0, 0), x(1, 0, 0), y(0, 1, 0), z(0, 0, 1);
 TEST(TriangleContact, NoSharedCorner) {
   const Corners flat = {o, x, y};
   EXPECT_TRUE(certainly_apart(flat, {o + z, x + z, y + z}, 0));
-  EXPECT_TRUE(certainly_apart(flat, {x + y, x + y + x, x + y + y}, 0));  // beside it in its plane
+  EXPECT_TRUE(certainly_apart(flat, {x + y, x + y + x, x + y + y}, 0));  // next to it in its plane
   EXPECT_FALSE(
       certainly_apart(flat, {Vector3d(0.2, 0.2, -1), Vector3d(0.3, 0.2, 1), Vector3d(0.2, 0.3, 1)}, 0));
   EXPECT_FALSE(certainly_apart(flat, {Vector3d(0.2, 0.2, 0), x + y, y + y}, 0));  // overlaps in its plane
-  EXPECT_FALSE(certainly_apart(flat, {Vector3d(0.2, 0.2, 0), x + z, y + z}, 0));  // a corner on it
-  EXPECT_FALSE(certainly_apart(flat, {x, x + x, x + z}, 0));                      // a corner on its corner
+  EXPECT_FALSE(certainly_apart(flat, {Vector3d(0.2, 0.2, 0), x + z, y + z}, 0));  // a corner in its interior
+  EXPECT_FALSE(certainly_apart(flat, {x, x + x, x + z}, 0));  // a corner at one of its corners
 }
 
 TEST(TriangleContact, OneSharedCorner) {
@@ -30,14 +30,14 @@ TEST(TriangleContact, OneSharedCorner) {
   EXPECT_TRUE(certainly_apart(flat, {o, -x, -x - y}, 1));  // a straight line through the corner
   EXPECT_TRUE(certainly_apart(flat, {o, -x, -y + 0.1 * x}, 1));
   EXPECT_FALSE(certainly_apart(flat, {o, x + y, x + y + y}, 1));      // overlaps in its plane
-  EXPECT_FALSE(certainly_apart(flat, {o, x, -y}, 1));                 // shares more than is said
+  EXPECT_FALSE(certainly_apart(flat, {o, x, -y}, 1));                 // shares more than specified
   EXPECT_FALSE(certainly_apart(flat, {o, x + y + z, x + y - z}, 1));  // passes through it
   EXPECT_TRUE(certainly_apart(flat, {o, -x - y + z, -x - y - z}, 1));
 }
 
 TEST(TriangleContact, SidesThatLieOnOneAnotherMeet) {
-  // Triangles with a corner in common, sides along one ray from it and the rest on either side, turned at
-  // random: the plane through two parallel sides is noise and separates nothing.
+  // Triangles with a common corner, sides along one ray from it and the other sides on either side, rotated
+  // at random: the plane through two parallel sides is only rounding error and separates nothing.
   std::mt19937 random(3);
   std::uniform_real_distribution<double> unit(-1.0, 1.0);
   const auto point = [&] { return Vector3d(unit(random), unit(random), unit(random)); };
@@ -57,8 +57,7 @@ TEST(TriangleContact, SharedEdge) {
   EXPECT_TRUE(certainly_apart(flat, {o, x, y + 0.001 * z}, 2));
 }
 
-/// Triangles that are called apart have no common point among many samples of both, turned and moved at
-/// random.
+/// Triangles reported as apart have no common point among many samples of both, rotated and moved at random.
 TEST(TriangleContact, NeverWronglySaysApart) {
   std::mt19937 random(1);
   std::uniform_real_distribution<double> unit(-1.0, 1.0);
@@ -66,7 +65,7 @@ TEST(TriangleContact, NeverWronglySaysApart) {
   int apart = 0, touching = 0;
   for (int round = 0; round < 2000; ++round) {
     const Corners a = {point(), point(), point()};
-    // The second one passes through a point of the first.
+    // The second triangle passes through a point of the first.
     const Vector3d inside = 0.3 * a[0] + 0.3 * a[1] + 0.4 * a[2];
     const Vector3d p = point(), q = point();
     const Corners through = {p, q, 3.0 * inside - p - q};
@@ -80,5 +79,5 @@ TEST(TriangleContact, NeverWronglySaysApart) {
   EXPECT_LT(apart, 2000);
 }
 
-}  // namespace
+}  // namespace triangle_contact_test
 }  // namespace hermesh

@@ -1,4 +1,4 @@
-// Triangles by place, for the question which of them might touch a box.
+// A spatial index of triangles, to find those that may intersect a box.
 #pragma once
 
 #include <Eigen/Core>
@@ -12,12 +12,12 @@
 
 namespace hermesh {
 
-/// Triangles by size and place: for each power of two a lattice of cells with a list each, found by hashing,
-/// that holds the triangles which are about as wide as a cell. So no triangle is in more than eight cells,
-/// however their sizes differ.
+/// Triangles by size and position: for each power of two, a lattice of cells, found by hashing, each with a
+/// list of the triangles that are about as wide as the cell. No triangle is in more than eight cells, however
+/// much their sizes differ.
 class TriangleGrid {
  public:
-  /// Sorts triangles into lattices. `boxes` are those of the triangles, and must outlive this.
+  /// Sorts triangles into lattices. `boxes` are their bounding boxes, and must outlive this object.
   explicit TriangleGrid(const std::vector<Bounds>& boxes) : boxes_(boxes), level_(boxes.size()) {
     double widths = 0.0;
     for (const Bounds& box : boxes) widths += width(box);
@@ -36,9 +36,9 @@ class TriangleGrid {
 
   int level(std::uint32_t triangle) const { return level_[triangle]; }
 
-  /// Calls visit(other) for the triangles from a level on whose cells the triangle's box touches: some of
-  /// them more than once, others besides, and itself. Each level from the triangle's own on has at most eight
-  /// such cells.
+  /// Calls visit(other) for the triangles of level `from_level` or higher whose cells the triangle's box
+  /// overlaps: possibly several times for the same one, for triangles that do not overlap the box, and for
+  /// the triangle itself. Each level from the triangle's own upwards has at most eight such cells.
   template <class Visit>
   void visit(std::uint32_t triangle, int from_level, Visit&& visit) const {
     for (auto k = static_cast<std::size_t>(from_level); k < levels_.size(); ++k)
@@ -85,7 +85,7 @@ class TriangleGrid {
         for (std::int64_t y = first[1]; y <= last[1]; ++y)
           for (std::int64_t z = first[2]; z <= last[2]; ++z) f(slot(x, y, z));
     }
-    /// The slot of a cell's list. Two cells may share one.
+    /// Returns the slot of a cell's list. Two cells may share a slot.
     std::size_t slot(std::int64_t x, std::int64_t y, std::int64_t z) const {
       std::uint64_t h = static_cast<std::uint64_t>(x) * 0x9e3779b97f4a7c15u;
       h ^= static_cast<std::uint64_t>(y) * 0xc2b2ae3d27d4eb4fu + (h >> 29);

@@ -8,15 +8,15 @@ namespace {
 
 using Place = OverTriangle::Place;
 
-/// A part narrower than this, in voxels, counts as none.
+/// Parts narrower than this, in voxels, are ignored.
 constexpr double kNarrow = 1e-9;
-/// Least cosine between a triangle and what covers it.
+/// Least cosine of the angle between a triangle and a face that covers it.
 constexpr double kFacing = 0.05;
 
 }  // namespace
 
-// Cuts off what lies beyond each of the three sides in turn (Sutherland & Hodgman 1974), in coordinates in
-// which each side is where one of them is zero.
+// Clips at each of the three sides in turn (Sutherland & Hodgman 1974), in coordinates in which each side is
+// a line where one of them is zero.
 ClippedTriangle::ClippedTriangle(const std::array<Place, 3>& triangle) {
   std::array<Place, 24> before;
   std::copy(triangle.begin(), triangle.end(), corners.begin());
@@ -24,7 +24,7 @@ ClippedTriangle::ClippedTriangle(const std::array<Place, 3>& triangle) {
   for (int side = 0; side < 3 && size > 0; ++side) {
     int outside = 0;
     for (int i = 0; i < size; ++i) outside += corners[i][side] > 0;
-    // Most triangles lie within some side as a whole: nothing is computed anew, so nothing is rounded.
+    // Most triangles lie within some side as a whole: nothing is recomputed, so nothing is rounded.
     if (outside == 0) continue;
     const int n = std::exchange(size, 0);
     std::copy_n(corners.begin(), n, before.begin());
@@ -36,8 +36,8 @@ ClippedTriangle::ClippedTriangle(const std::array<Place, 3>& triangle) {
   }
 }
 
-// The part of the segment that is within all three sides is an interval. A segment that runs along a side, or
-// less than kNarrow within it, leads nowhere that matters.
+// The part of the segment within all three sides is an interval. A segment that runs along a side, or less
+// than kNarrow within it, may be ignored.
 bool passes_over(const Place& from, const Place& to) {
   double begin = 0, end = 1;
   for (int i = 0; i < 3; ++i) {
@@ -48,9 +48,10 @@ bool passes_over(const Place& from, const Place& to) {
   return begin < end;
 }
 
-/// Whether the part over the triangle has some area, more than kNarrow from the sides: a part within that
-/// would have no side that passes_over(), and all else would be taken for covered. Seen along the triangle's
-/// normal, two of the distances beyond its sides are coordinates.
+/// Returns true if the part over the triangle has some area, more than kNarrow from the sides. A part within
+/// that distance would have no side for which passes_over() holds, so the rest of the triangle would be
+/// considered covered. Seen along the triangle's normal, two of the distances beyond its sides are
+/// coordinates.
 bool TriangleOverlay::overlaps(std::array<Place, 3> places) {
   for (Place& place : places) place.head<3>().array() += kNarrow;
   const ClippedTriangle part(places);
@@ -67,8 +68,8 @@ bool TriangleOverlay::is_near_and_faces_alike(const OverTriangle& over, const Ei
                                               const std::array<Place, 3>& places, double within) {
   if (!(normal.cast<double>().dot(over.normal()) > kFacing)) return false;
   const double highest = std::max({std::abs(places[0][3]), std::abs(places[1][3]), std::abs(places[2][3])});
-  // Heights are affine, so the corners' bound that of all of the face; only where they are too high is the
-  // part over the triangle looked at by itself.
+  // Heights are affine, so those of the corners bound that of the whole face; only if they are too high is
+  // the part over the triangle clipped and tested.
   if (highest <= within) return true;
   const ClippedTriangle part(places);
   for (int i = 0; i < part.size; ++i)

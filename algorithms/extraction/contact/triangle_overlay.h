@@ -1,4 +1,4 @@
-// Whether a triangle is near another surface as a whole, by laying that over it.
+// Bounds the distance of a whole triangle from another surface by projecting that surface onto it.
 #pragma once
 
 #include <Eigen/Core>
@@ -13,9 +13,8 @@
 
 namespace hermesh {
 
-/// Coordinates of places seen from a triangle, all of them affine: how far a place lies beyond each of the
-/// three sides, along the triangle's plane, and how high above the plane. Lengths are those of the corners'
-/// coordinates.
+/// Affine coordinates of positions relative to a triangle: the distances beyond each of the three sides, in
+/// the triangle's plane, and the height above the plane, in units of the corners' coordinates.
 class OverTriangle {
  public:
   using Place = Eigen::Vector4d;  ///< beyond sides 0, 1, 2 (positive outside), height
@@ -38,7 +37,7 @@ class OverTriangle {
   const Eigen::Vector3d& normal() const { return normal_; }
   Place operator()(const Eigen::Vector3d& p) const { return axes_ * (p - origin_) - offsets_; }
 
-  /// What the coordinates are computed from: they are axes * (p − origin) − offsets.
+  /// Coefficients of the coordinates: axes * (p − origin) − offsets.
   struct Frame {
     const Eigen::Matrix<double, 4, 3>& axes;
     const Eigen::Vector3d& origin;
@@ -53,34 +52,35 @@ class OverTriangle {
   bool degenerate_;
 };
 
-/// The part of a triangle over another one, by its corners: six at most, or more where rounding makes it not
-/// quite convex.
+/// The corners of the part of a triangle over another one: six at most, or more if rounding makes the part
+/// slightly non-convex.
 struct ClippedTriangle {
-  std::array<OverTriangle::Place, 24> corners;  // each of three cuts at most doubles them
+  std::array<OverTriangle::Place, 24> corners;  // each of three cuts at most doubles their number
   int size = 0;
   explicit ClippedTriangle(const std::array<OverTriangle::Place, 3>& triangle);
 };
 
-/// Whether some of the segment lies above or below the inside of the triangle.
+/// Returns true if part of the segment lies above or below the interior of the triangle.
 bool passes_over(const OverTriangle::Place& from, const OverTriangle::Place& to);
 
-/// Lays a mesh over one triangle after another. An object remembers which faces it has seen, so each thread
+/// Projects a mesh onto one triangle after another. An object remembers the visited faces, so each thread
 /// needs its own.
 class TriangleOverlay {
  public:
   explicit TriangleOverlay(std::size_t faces) : seen_(faces) {}
 
-  /// True only if every point of the triangle t has a point of the mesh right above or below it, no farther
-  /// away than `within(face)`, a double, says of the face that this lies in.
+  /// Returns true only if every point of the triangle t has a point of the mesh directly above or below it,
+  /// no farther away than `within(face)`, a double, for the face that contains that point.
   ///
-  /// **Why.** From `start`, which must overlap t, the faces that overlap the prism over t are collected,
-  /// across every side that passes over its inside. All of them face as t does. So the projection of their
-  /// union onto t's inside is open; it is closed, too, for no side leads out of it; so it is all of t. Over
-  /// the part of a face that lies over t heights are largest at the part's corners, and these are looked at.
-  /// (Slivers that rounding hides are some 1e-9 voxels wide.)
+  /// **Proof.** Starting at `start`, which must overlap t, the search collects the faces that overlap the
+  /// prism over t, across every side that passes over the interior of t. All of them face the same direction
+  /// as t. So the projection of their union onto the interior of t is open; it is also closed, because no
+  /// side leads out of it; so it is all of t. Over the part of a face that lies over t, the largest heights
+  /// are at the corners of that part, and these are tested. (Rounding may hide slivers about 1e-9 voxels
+  /// wide.)
   ///
-  /// `Mesh` is as FineMesh. `seen(face, places)` is called, whatever the answer is, for faces that are no
-  /// farther away than within(face) wherever they are over t; `places` are their corners, seen from t.
+  /// `Mesh` has the interface of FineMesh. `seen(face, places)` is called, whatever the result, for faces
+  /// that are no farther away than within(face) everywhere over t; `places` are their corners, relative to t.
   template <class Mesh, class Within, class Seen>
   bool is_near(const Corners& t, const Mesh& mesh, std::uint32_t start, Within&& within, Seen&& seen) {
     const OverTriangle over(t);
@@ -88,7 +88,7 @@ class TriangleOverlay {
     if (++question_ == 0) std::fill(seen_.begin(), seen_.end(), 0), question_ = 1;
     const Corners first = mesh.corners(start);
     std::array<OverTriangle::Place, 3> places = {over(first[0]), over(first[1]), over(first[2])};
-    // All faces but the first are come to over the inside of t.
+    // All faces except the first are reached across a side over the interior of t.
     if (!overlaps(places)) return false;
     seen_[start] = question_;
     entries_.clear();
@@ -102,7 +102,7 @@ class TriangleOverlay {
         if (!passes_over(places[i], places[j])) continue;
         if (side == Mesh::kNone) return false;
         seen_[side / 3] = question_;
-        // The face beyond has the side's ends the other way around.
+        // The adjacent face has the ends of the side in reverse order.
         entries_.push_back({side, places[j], places[i]});
       }
       if (entries_.empty()) return true;
@@ -116,7 +116,7 @@ class TriangleOverlay {
     }
   }
 
-  /// is_near() for those who need not know which faces t is covered by.
+  /// Does the same for callers that do not need the faces that cover t.
   template <class Mesh, class Within>
   bool is_near(const Corners& t, const Mesh& mesh, std::uint32_t start, Within&& within) {
     return is_near(t, mesh, start, within, [](std::uint32_t, const std::array<OverTriangle::Place, 3>&) {});
@@ -127,9 +127,9 @@ class TriangleOverlay {
   static bool is_near_and_faces_alike(const OverTriangle& over, const Eigen::Vector3f& normal,
                                       const std::array<OverTriangle::Place, 3>& places, double within);
 
-  /// A face that is still to be looked at: the side that it was come to by, and where that starts and ends.
+  /// A face still to be visited: the side through which it was reached, and the ends of that side.
   struct Entry {
-    std::uint32_t side;  ///< as FineMesh::side_across() numbers it
+    std::uint32_t side;  ///< numbered as in FineMesh::side_across()
     OverTriangle::Place from, to;
   };
   std::vector<std::uint32_t> seen_;

@@ -8,7 +8,7 @@
 #include "algorithms/search/triangle_tree.h"
 
 namespace hermesh {
-namespace {
+namespace triangle_overlay_test {
 
 using Eigen::Vector3d;
 
@@ -36,14 +36,14 @@ bool is_near(const Corners& t, const FineMesh& mesh, std::uint32_t start, double
 }
 
 TEST(TriangleOverlay, FindsTheGreatestHeightWhereverItIs) {
-  // A tent whose ridge, at height 1, passes through no corner of the triangle: heights 1 and -0 at its own
-  // corners.
+  // A tent whose ridge, at height 1, passes through no corner of the triangle: its own corners have heights 1
+  // and −0.
   const FineMesh tent = sheet(8, [](int x, int) { return x == 4 ? 1.0 : 0.0; });
   const Corners t = {Vector3d(2.5, 2, 0), Vector3d(5.5, 2, 0), Vector3d(4, 5, 0)};
   const std::uint32_t start = 2 * (2 * 8 + 3);
   EXPECT_TRUE(is_near(t, tent, start, 1.0));
   EXPECT_FALSE(is_near(t, tent, start, 0.999));
-  // Beside the ridge: the side at x = 3.5 is the highest, half way up.
+  // Next to the ridge: the side at x = 3.5 is the highest, half way up.
   const Corners beside = {Vector3d(1.5, 2, 0), Vector3d(3.5, 2, 0), Vector3d(2.5, 5, 0)};
   EXPECT_TRUE(is_near(beside, tent, 2 * (2 * 8 + 2), 0.5));
   EXPECT_FALSE(is_near(beside, tent, 2 * (2 * 8 + 2), 0.499));
@@ -92,7 +92,7 @@ TEST(TriangleOverlay, NeverSaysYesWhereSamplesSayNo) {
     if (n[2] < 0) std::swap(t[1], t[2]);
     const Vector3d middle = (t[0] + t[1] + t[2]) / 3.0;
     const double within = 0.3 + 0.3 * share(random);
-    // Every other time from a face that need not be under the triangle at all.
+    // Every other search starts at a face that need not be under the triangle.
     const std::uint32_t start =
         trial % 2 ? rough.walk(0, middle) : static_cast<std::uint32_t>(random() % 128);
     const bool said = is_near(t, rough, start, within);
@@ -114,5 +114,5 @@ TEST(TriangleOverlay, NeverSaysYesWhereSamplesSayNo) {
   EXPECT_GT(far, 20);
 }
 
-}  // namespace
+}  // namespace triangle_overlay_test
 }  // namespace hermesh

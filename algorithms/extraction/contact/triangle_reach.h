@@ -1,4 +1,4 @@
-// Whether points are within a distance of a triangle: for many points and one triangle.
+// Tests many points for being within a distance of one triangle.
 #pragma once
 
 #include <Eigen/Core>
@@ -11,9 +11,8 @@
 
 namespace hermesh {
 
-/// Tells whether points are near a triangle, by the triangle's plane and the three planes through its sides
-/// at right angles to it. Most points are decided by these; only those beside the triangle need the exact
-/// distance.
+/// Tests if points are near a triangle, by the triangle's plane and the three planes through its sides
+/// perpendicular to it. These decide most points; only those next to the triangle need the exact distance.
 class TriangleReach {
  public:
   TriangleReach() = default;
@@ -29,10 +28,10 @@ class TriangleReach {
     // decides.
   }
 
-  /// How far p lies beyond the three sides, along the plane: negative inside.
+  /// Returns the distances of p beyond the three sides, along the plane: negative inside.
   Eigen::Vector3d beyond(const Eigen::Vector3d& p) const { return sides_ * p - offsets_; }
 
-  /// Whether p is no farther than `within` from the triangle.
+  /// Returns true if p is no farther than `within` from the triangle.
   bool near(const Eigen::Vector3d& p, double within) const {
     const double height = normal_.dot(p - corners_[0]);
     if (std::abs(height) > within) return false;

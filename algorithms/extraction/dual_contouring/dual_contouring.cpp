@@ -6,7 +6,6 @@
 
 #include "algorithms/core/option_table.h"
 #include "algorithms/core/parallel.h"
-#include "algorithms/extraction/dual_contouring/level_set_contouring.h"
 #include "algorithms/extraction/dual_contouring/qef.h"
 #include "algorithms/extraction/hermite_input.h"
 #include "algorithms/lattice/active_cells.h"
@@ -14,16 +13,16 @@
 namespace hermesh {
 namespace {
 
-/// How far a vertex that is held in its cell stays off the cell's faces, in voxels, so that two such never
+/// Distance of a vertex that is held in its cell from the cell's faces, in voxels, so that two never
 /// coincide.
 constexpr double kCellMargin = 1.0 / 1024.0;
 
-/// A point leaves its cell where the best place within it lies this far off the planes, in voxels and root
-/// mean square: next to a feature that passes outside. Letting every minimiser go nearly doubles the
-/// self-intersections of a scan, whose minimisers leave for nothing.
+/// A vertex leaves its cell if the best position within it lies this far off the planes, in voxels and root
+/// mean square: next to a feature that passes outside. Releasing every minimiser nearly doubles the
+/// self-intersections of a scan, where they leave without need.
 constexpr double kWorthLeaving = 0.1;
 
-/// What one block adds to the mesh, and where in it.
+/// The part of the mesh from one block, and its range.
 struct BlockOutput : ActiveCells {
   std::uint32_t first_quad;
 
@@ -36,8 +35,8 @@ class Contourer {
       : grid_(grid), options_(options), outputs_(grid.blocks().size()) {}
 
   PolygonMesh run(RunContext& context) {
-    // Count, scan, fill (core/parallel.h): in each pass a block writes its own entries and reads others' of
-    // passes before. So the mesh is the same for any number of threads.
+    // Count, scan, fill (core/parallel.h): in each pass a block writes its own entries and reads those of
+    // earlier passes. So the mesh is the same for any number of threads.
     const std::size_t blocks = outputs_.size();
     std::vector<std::uint64_t> points(blocks), quads(blocks);
     PolygonMesh mesh;
@@ -53,7 +52,7 @@ class Contourer {
     }
     mesh.points.resize(exclusive_scan(points, "points"));
     mesh.quads.resize(exclusive_scan(quads, "quads"));
-    // Places are kept in voxels and double precision beside the mesh's points, for the choice of diagonals.
+    // Positions in voxels and double precision, for the choice of diagonals.
     positions_.resize(mesh.points.size());
     for (std::size_t b = 0; b < blocks; ++b) {
       outputs_[b].first_point = static_cast<std::uint32_t>(points[b]);
@@ -71,7 +70,7 @@ class Contourer {
   }
 
  private:
-  /// A sample all 26 of whose neighbours are on the other side, with the points and quads around it.
+  /// A sample whose 26 neighbours are all on the other side, with the vertices and quads around it.
   struct LoneSample {
     Eigen::Vector3d place;                ///< voxels, relative to the placement's base
     double sign;                          ///< 1 inside, −1 outside
@@ -80,7 +79,7 @@ class Contourer {
     std::array<std::array<double, 2>, 3> hits;  ///< distances of the crossings below and above, by axis
   };
 
-  /// Finds the block's samples that are alone on their side.
+  /// Finds the lone samples of a block.
   void find_lone_samples(std::int32_t b, std::vector<LoneSample>& found) const {
     const HermiteView::Block& block = grid_.blocks()[b];
     BlockMask candidates;
@@ -121,10 +120,10 @@ class Contourer {
     });
   }
 
-  /// Keeps the surface around a lone sample from being inside out. Around other samples points that leave
-  /// their cells do not go as far as the opposite side. Around a lone one they can pass one another in the
-  /// middle: if its volume has the wrong sign, or none, the eight vertices move to the means of the
-  /// crossings next to the sample, a box around it.
+  /// Prevents the surface around a lone sample from being inside out, because vertices that leave their cells
+  /// can pass one another in the middle there (but do not reach the opposite side around other samples). If
+  /// its volume has the wrong sign, or none, the eight vertices move to the means of the edge crossings next
+  /// to the sample, a box around it.
   void turn_lone_samples(PolygonMesh& mesh, RunContext& context) const {
     std::vector<std::vector<LoneSample>> found(outputs_.size());
     parallel_blocks(found.size(), context,
@@ -153,15 +152,15 @@ class Contourer {
       }
       return true;
     };
-    // Two lone samples, diagonally apart, may share points, so all are looked at again after one was turned.
-    // None is turned twice: a point within its cell is on the right side of both.
+    // Two lone samples, diagonally apart, may share vertices, so all are tested again after one was turned.
+    // None is turned twice: a vertex within its cell is on the right side of both.
     const auto turn = [&](std::vector<LoneSample>& list) { return std::erase_if(list, turned) > 0; };
     while (std::ranges::count_if(found, turn) > 0) {
     }
   }
 
   Qef gather(std::int32_t b, const int (&cell)[3], const Eigen::Vector3d& corner) const {
-    // About the cell's centre, from which no crossing is farther than the corners are.
+    // About the cell's centre, since no edge crossing is farther from it than the corners.
     Qef qef(corner + Eigen::Vector3d::Constant(0.5));
     for (int axis = 0; axis < 3; ++axis)
       for (int step = 0; step < 4; ++step) {
@@ -170,9 +169,7 @@ class Contourer {
         d[(axis + 2) % 3] = step >> 1;
         const LatticePlace at =
             locate(grid_.blocks()[b].neighbours, cell[0] + d[0], cell[1] + d[1], cell[2] + d[2]);
-        // Where there is no block no edge is crossed.
-        if (at.block < 0) continue;
-        if (!test(grid_.blocks()[at.block].crossing[axis], at.sample)) continue;
+        if (at.block < 0 || !test(grid_.blocks()[at.block].crossing[axis], at.sample)) continue;
         const EdgeCrossing crossing = grid_.crossing(at.block, at.sample, axis);
         Eigen::Vector3d point = corner + Eigen::Vector3d(d[0], d[1], d[2]);
         point[axis] += crossing.offset;
@@ -212,9 +209,8 @@ class Contourer {
       Eigen::Vector3d hit;
       for (int a = 0; a < 3; ++a) hit[a] = block.lower[a] - placement.base[a] + at[a];
       hit[axis] += grid_.crossing(b, sample, axis).offset;
-      // Whoever splits a quad cuts between its corners 0 and 2, so that the better diagonal is put there.
-      // Where the sample before the crossing is inside, the outside lies along the axis; a map that mirrors
-      // turns that about.
+      // Diagonal 0–2 is the split. If the sample before the crossing is inside, the outside lies along the
+      // axis, unless the map mirrors.
       if (second_diagonal_is_better(quad, hit, axis)) quad = {quad[1], quad[2], quad[3], quad[0]};
       if (test(block.inside, sample) == placement.mirrors()) std::swap(quad[1], quad[3]);
       *next++ = quad;
@@ -222,7 +218,8 @@ class Contourer {
     for_each_edge_with_cells(grid_.blocks(), static_cast<std::size_t>(b), connect_edge);
   }
 
-  /// Where the plane of three points meets the grid edge's line, along the axis; NaN if they are on one line.
+  /// Returns where the plane of three vertices meets the lattice edge's line, along the axis; NaN if they are
+  /// collinear.
   double height(const Quad& quad, std::array<int, 3> corners, const Eigen::Vector3d& hit, int axis) const {
     // Relative to the crossing: a height of 0 means that the surface passes through it.
     const Eigen::Vector3d a = positions_[quad[corners[0]]] - hit;
@@ -231,21 +228,21 @@ class Contourer {
     return normal.dot(a) / normal[axis];
   }
 
-  /// The split must follow a crease. The crossing itself lies on the true surface, so the diagonal is right
-  /// whose surface passes nearer to it; where both do, the shorter one makes the better triangles.
+  /// The split must follow a crease. The edge crossing lies on the true surface, so the diagonal whose
+  /// surface passes nearer to it is right; if both do, the shorter one makes the better triangles.
   bool second_diagonal_is_better(const Quad& quad, const Eigen::Vector3d& hit, int axis) const {
     const int u = (axis + 1) % 3, v = (axis + 2) % 3;
     const auto left_of = [&](int i, int j) {
       const Eigen::Vector3d a = positions_[quad[i]] - hit, c = positions_[quad[j]] - hit;
       return a[u] * c[v] - a[v] * c[u] > 0;
     };
-    // The grid edge's line passes through one of the diagonal's two triangles, which the side of the diagonal
-    // tells.
+    // The lattice edge's line passes through one of the diagonal's two triangles, given by the diagonal's
+    // side.
     const double first = height(quad, left_of(0, 2) ? std::array{0, 2, 3} : std::array{0, 1, 2}, hit, axis);
     const double second = height(quad, left_of(1, 3) ? std::array{1, 3, 0} : std::array{1, 2, 3}, hit, axis);
     constexpr double kAlike = 1e-3;  // voxels
     const double difference = std::abs(first) - std::abs(second);
-    // A height that is no number compares as false, and leaves the choice to the lengths.
+    // A height of NaN compares as false, and leaves the choice to the lengths.
     if (std::abs(difference) > kAlike) return difference > 0;
     const double d02 = (positions_[quad[0]] - positions_[quad[2]]).squaredNorm();
     const double d13 = (positions_[quad[1]] - positions_[quad[3]]).squaredNorm();
@@ -258,41 +255,6 @@ class Contourer {
   std::vector<Eigen::Vector3d> positions_;  ///< index space, relative to the placement's base
 };
 
-}  // namespace
-
-double DualContouringOptions::smooth_share() const {
-  if (placement != Placement::unbiased) return 1.0;
-  return linear_crossings ? Qef::kShareOfLinear : Qef::kShareOfExact;
-}
-
-Eigen::Vector3d place_by_planes(const Qef& qef, const Eigen::Vector3d& corner,
-                                const DualContouringOptions& options) {
-  const Eigen::Vector3d free = qef.minimiser(options.truncation), mass = qef.mass_point();
-  const double share = qef.share_of_minimiser(options.smooth_share(), options.truncation);
-  const double from_centre = (free - corner - Eigen::Vector3d::Constant(0.5)).cwiseAbs().maxCoeff();
-  // What lies on a plane of the lattice comes out on it. A level set's crossings there are rounded to both
-  // sides of it.
-  const double inside = options.linear_crossings ? 0.5 - kCellMargin : 0.5;
-  if (from_centre <= inside) return mass + share * (free - mass);
-  const Eigen::Vector3d margin = Eigen::Vector3d::Constant(kCellMargin);
-  const Eigen::Vector3d lower = corner + margin, upper = corner + Eigen::Vector3d::Ones() - margin;
-  const Eigen::Vector3d held = qef.minimiser_within(lower, upper, options.truncation);
-  const bool leaves = qef.error(held) > kWorthLeaving * kWorthLeaving * qef.planes() ||
-                      (!options.linear_crossings && qef.planes_meet(free, held));
-  if (options.reach > 0 && leaves && from_centre <= 0.5 + options.reach) return free;
-  // Both ends of the way lie in the cell, so whatever is between them does.
-  const Eigen::Vector3d start = mass.cwiseMax(lower).cwiseMin(upper);
-  return start + share * (held - start);
-}
-
-PolygonMesh dual_contouring(const HermiteView& grid, const DualContouringOptions& options,
-                            RunContext& context) {
-  return Contourer(grid, options).run(context);
-}
-
-namespace {
-
-/// The options that set DualContouringOptions.
 const OptionTable<DualContouringOptions>& contouring_option_table() {
   using Options = DualContouringOptions;
   using Placement = Options::Placement;
@@ -328,6 +290,35 @@ DualContouringOptions read(const OptionTable<DualContouringOptions>& table, cons
 
 }  // namespace
 
+double DualContouringOptions::smooth_share() const {
+  if (placement != Placement::unbiased) return 1.0;
+  return linear_crossings ? Qef::kShareOfLinear : Qef::kShareOfExact;
+}
+
+Eigen::Vector3d place_by_planes(const Qef& qef, const Eigen::Vector3d& corner,
+                                const DualContouringOptions& options) {
+  const Eigen::Vector3d free = qef.minimiser(options.truncation), mass = qef.mass_point();
+  const double share = qef.share_of_minimiser(options.smooth_share(), options.truncation);
+  const double from_centre = (free - corner - Eigen::Vector3d::Constant(0.5)).cwiseAbs().maxCoeff();
+  // Vertices on a lattice plane stay on it, except with a level set's crossings, rounded to both its sides.
+  const double inside = options.linear_crossings ? 0.5 - kCellMargin : 0.5;
+  if (from_centre <= inside) return mass + share * (free - mass);
+  const Eigen::Vector3d margin = Eigen::Vector3d::Constant(kCellMargin);
+  const Eigen::Vector3d lower = corner + margin, upper = corner + Eigen::Vector3d::Ones() - margin;
+  const Eigen::Vector3d held = qef.minimiser_within(lower, upper, options.truncation);
+  const bool leaves = qef.error(held) > kWorthLeaving * kWorthLeaving * qef.planes() ||
+                      (!options.linear_crossings && qef.planes_meet(free, held));
+  if (options.reach > 0 && leaves && from_centre <= 0.5 + options.reach) return free;
+  // Both ends of the path lie in the cell, and so does the path.
+  const Eigen::Vector3d start = mass.cwiseMax(lower).cwiseMin(upper);
+  return start + share * (held - start);
+}
+
+PolygonMesh dual_contouring(const HermiteView& grid, const DualContouringOptions& options,
+                            RunContext& context) {
+  return Contourer(grid, options).run(context);
+}
+
 DualContouringOptions read_dual_contouring_options(const ExtractionInput& input) {
   return read(contouring_option_table(), input);
 }
@@ -338,8 +329,8 @@ DualContouringOptions read_placement_options(const ExtractionInput& input) {
 
 PolygonMesh dual_contouring(const ExtractionInput& input) {
   const DualContouringOptions options = read_dual_contouring_options(input);
-  // Crossings that nobody else wants are best found a leaf at a time and not kept. The polygons
-  // are the same but for rounding.
+  // Edge crossings without another use are found a leaf at a time and not stored. The polygons are the same
+  // except for rounding.
   if (from_level_set_alone(input) && can_contour_level_set(options))
     return contour_level_set(input.level_set, input.isovalue, options, input.context);
   const FloatHermite hermite = hermite_input(input, "dual-contouring", options.needs_normals());

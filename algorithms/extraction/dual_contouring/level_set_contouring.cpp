@@ -1,5 +1,3 @@
-#include "algorithms/extraction/dual_contouring/level_set_contouring.h"
-
 #include <sys/mman.h>
 #include <tbb/enumerable_thread_specific.h>
 
@@ -12,6 +10,7 @@
 
 #include "algorithms/core/large_array.h"
 #include "algorithms/core/parallel.h"
+#include "algorithms/extraction/dual_contouring/dual_contouring.h"
 #include "algorithms/extraction/dual_contouring/kernels/leaf_kernels.h"
 #include "algorithms/extraction/dual_contouring/qef.h"
 #include "algorithms/hermite/leaf_stencils.h"
@@ -25,8 +24,8 @@ using leaf_kernels::LeafCells;
 using leaf_kernels::UpperSigns;
 using Position = std::array<std::int32_t, 3>;  // index coordinates
 
-/// Room for `n` elements in huge pages, where the machine has any: the first touch of a small page costs more
-/// than filling it.
+/// Reserves `n` elements in huge pages if possible: the first touch of a small page costs more than filling
+/// it.
 template <class T>
 void reserve_huge(std::vector<T>& array, std::size_t n) {
   constexpr std::size_t kPage = std::size_t{2} << 20;
@@ -34,11 +33,11 @@ void reserve_huge(std::vector<T>& array, std::size_t n) {
 #if defined(MADV_HUGEPAGE)
   const auto first = (reinterpret_cast<std::uintptr_t>(array.data()) + kPage - 1) / kPage * kPage;
   const auto end = reinterpret_cast<std::uintptr_t>(array.data() + n) / kPage * kPage;
-  if (first < end) madvise(reinterpret_cast<void*>(first), end - first, MADV_HUGEPAGE);  // a wish
+  if (first < end) madvise(reinterpret_cast<void*>(first), end - first, MADV_HUGEPAGE);  // advice
 #endif
 }
 
-/// Places the cells that the vector code leaves over, in the way of the general contouring.
+/// Computes the vertices that the vector code cannot, in the same way as dual_contouring().
 class Plain final : public leaf_kernels::PlainCode {
  public:
   explicit Plain(const DualContouringOptions& options) : options_(options) {}
@@ -48,7 +47,7 @@ class Plain final : public leaf_kernels::PlainCode {
     for (int i = 0; i < count; ++i)
       qef.add_plane(Eigen::Vector3f(planes[i].point).cast<double>(),
                     Eigen::Vector3f(planes[i].normal).cast<double>());
-    // Planes are relative to the cell's centre, so that its first corner is at −½.
+    // Planes are relative to the cell's centre, so its first corner is at −½.
     const Eigen::Vector3d found = place_by_planes(qef, Eigen::Vector3d::Constant(-0.5), options_);
     for (int k = 0; k < 3; ++k) place[k] = static_cast<float>(found[k]);
   }
@@ -57,13 +56,12 @@ class Plain final : public leaf_kernels::PlainCode {
   const DualContouringOptions& options_;
 };
 
-/// Count, scan, fill. What bounds each pass, by profiles of the bunny and the Nefertiti at 800 voxels with
-/// AVX-512: reading the signs, memory bandwidth; counting, the leaves' neighbours, that is latency; average
+/// Count, scan, fill. Limits of each pass, by profiles of the bunny and the Nefertiti at 800 voxels with
+/// AVX-512: reading the signs, memory bandwidth; counting, the latency of the leaves' neighbours; average
 /// placement, a third of the time waiting for the samples' cache lines in spite of the prefetches, then the
-/// gathers of corners; optimal placement, arithmetic more than twice as long as all that (planes first, then
-/// crossings); the quads, instructions: lists of bits, shuffles. Where the machine clears pages slowly, a
-/// fifth of it all goes into the first touches of the results, so nothing is kept beside these that can be
-/// found anew.
+/// gathers of corners; optimal placement, arithmetic more than twice as long as all that; the quads,
+/// instructions: lists of bits, shuffles. If pages are cleared slowly, a fifth of the time goes into the
+/// first touches of the results, so values that can be recomputed are not stored.
 class LevelSetContourer {
  public:
   LevelSetContourer(const LeafTable& table, const SampledVolume& volume, const IndexToWorld& placement,
@@ -76,8 +74,8 @@ class LevelSetContourer {
         cells_(table_.size()),
         upper_(table_.size()) {}
 
-  /// Finds the active cells and gives every leaf its first point and quad. Returns the leaves that the tree
-  /// lacks although they hold active cells.
+  /// Finds the active cells and the first vertex and quad of every leaf. Returns the lower corners of missing
+  /// leaves that contain active cells.
   std::vector<Position> count() {
     const Stage stage(context_, "count");
     std::vector<std::uint64_t> points(table_.size()), quads(table_.size());
@@ -92,7 +90,7 @@ class LevelSetContourer {
       for (int slot = 1; slot < 7; ++slot) {
         const int dx = slot & 1, dy = slot >> 1 & 1, dz = slot >> 2;
         if (!(needs >> slot & 1) || table_.neighbour(leaf, -dx, -dy, -dz) >= 0) continue;
-        // The order of this list depends on the threads, but not the tree that has its leaves.
+        // The order of this list depends on the threads, but the tree with its leaves does not.
         const std::scoped_lock hold(lock);
         const auto [x, y, z] = table_.lower(leaf);
         missing.push_back({x - 8 * dx, y - 8 * dy, z - 8 * dz});
@@ -101,7 +99,7 @@ class LevelSetContourer {
     points_ = exclusive_scan(points, "points");
     quads_ = exclusive_scan(quads, "quads");
     for (std::size_t leaf = 0; leaf < table_.size(); ++leaf) {
-      // The passes to come look at leaves with work alone.
+      // Later passes visit only leaves with work.
       if (cells_[leaf].points == 0 && cells_[leaf].quads == 0) continue;
       cells_[leaf].first_point = static_cast<std::uint32_t>(points[leaf]);
       cells_[leaf].first_quad = static_cast<std::uint32_t>(quads[leaf]);
@@ -122,7 +120,7 @@ class LevelSetContourer {
       place_all({mesh.points.data()->data(), offsets.data()});
     }
     const Stage stage(context_, "connect");
-    // All points are there: a leaf reads those of its lower neighbours' cells and writes its own quads.
+    // A leaf reads the vertices of its lower neighbours' cells and writes its own quads.
     const bool mirrors = placement_.mirrors();
     const Eigen::Matrix3d to_voxels = placement_.linear.inverse();
     parallel_blocks(live_.size(), context_, [&](std::size_t i) {
@@ -140,8 +138,7 @@ class LevelSetContourer {
       }
       const Neighbours lower = table_.neighbours(live_[i], -1);
       for (int slot = 0; slot < 8; ++slot)
-        // A tile below has no cells, and none that is needed: contour_level_set() has made leaves of all that
-        // had some.
+        // A tile below has no cells that are needed: contour_level_set() has replaced the others by leaves.
         input.cells[slot] = lower[slot] >= 0 ? &cells_[static_cast<std::size_t>(lower[slot])] : nullptr;
       kernels_.connect(input, mesh.quads[cells.first_quad].data());
     });
@@ -157,15 +154,15 @@ class LevelSetContourer {
     return signs;
   }
 
-  /// Where the leaf's first sample is in the mesh's coordinates.
+  /// Returns the leaf's first sample in the mesh's coordinates.
   Eigen::Vector3d corner_of(std::size_t leaf) const {
     const auto [x, y, z] = table_.lower(leaf);
     return placement_.local(
         Eigen::Vector3d(x - placement_.base[0], y - placement_.base[1], z - placement_.base[2]));
   }
 
-  /// The samples that a leaf further on reads lie where no machine can guess, and waiting for them costs more
-  /// than the arithmetic. Those of the leaf below along z came just before.
+  /// Prefetches the samples of a later leaf, whose addresses are unpredictable: waiting for them costs more
+  /// than the arithmetic. Those of the leaf below along z were read just before.
   void prefetch_samples(std::size_t leaf) const {
     const auto lines = [&](std::int32_t there, int first, int stride, int count) {
       if (there < 0) return;
@@ -183,8 +180,8 @@ class LevelSetContourer {
     lines(table_.neighbour(leaf, 0, -1, 0), 7 * 8, 64, 8);
   }
 
-  /// Samples around the leaf for average placement, which reads those of the upper neighbours that its last
-  /// cells touch.
+  /// Finds the samples for average placement, which reads the upper neighbours that the leaf's last cells
+  /// touch.
   void find_corner_samples(std::size_t leaf, leaf_kernels::PlaceInput& input) const {
     static thread_local std::array<std::array<float, 512>, 8> tiles;
     std::uint64_t any = 0;
@@ -195,13 +192,13 @@ class LevelSetContourer {
       if (slot & ~touched) continue;
       const int dx = slot & 1, dy = slot >> 1 & 1, dz = static_cast<int>(slot >> 2);
       const std::int32_t there = upper_[leaf][slot];
-      // A tile is spread out as the samples of a leaf, so that the kernels need not tell the two apart.
+      // A tile becomes the samples of a leaf, so the kernels need not distinguish the two.
       if (there < 0) tiles[slot].fill(table_.value_at(leaf, 8 * dx, 8 * dy, 8 * dz));
       input.values[neighbour_slot(dx, dy, dz)] = there >= 0 ? table_.values(there) : tiles[slot].data();
     }
   }
 
-  /// Places the points of all leaves; `output` is where those of the first leaf go.
+  /// Computes the vertices of all leaves; `output` is the range of the first leaf.
   void place_all(const leaf_kernels::PlaceOutput& output) {
     const Plain plain(options_);
     leaf_kernels::PlaceRules rules{};
@@ -211,12 +208,11 @@ class LevelSetContourer {
     rules.reach = static_cast<float>(options_.reach);
     rules.smooth_share = static_cast<float>(options_.smooth_share());
     rules.plain = &plain;
-    // Which cells share a vector depends on the threads. That changes no byte, because
-    // lanes know nothing of each other.
+    // Which cells share a vector depends on the threads. That changes no byte, because lanes are independent.
     tbb::enumerable_thread_specific<std::unique_ptr<leaf_kernels::LaterCells>> later_cells(
         [] { return std::make_unique_for_overwrite<leaf_kernels::LaterCells>(); });
     parallel_blocks(live_.size(), context_, [&](std::size_t i) {
-      // The next leaf but one is mostly this thread's, because threads take leaves in runs.
+      // The leaf after the next is mostly this thread's, because threads take leaves in runs.
       if (i + 2 < live_.size()) prefetch_samples(live_[i + 2]);
       leaf_kernels::LaterCells& later = *later_cells.local();
       place(live_[i], rules, output, later);
@@ -242,7 +238,7 @@ class LevelSetContourer {
     input.scale = table_.rule().scale;
     const Eigen::Vector3d corner = corner_of(leaf);
     for (int axis = 0; axis < 3; ++axis) input.corner[axis] = corner[axis];
-    // The ranges of this leaf, which no other one writes.
+    // The ranges of this leaf.
     output.points += 3 * std::size_t{cells.first_point};
     output.offsets += cells.first_quad;
     if (optimal)
@@ -258,7 +254,7 @@ class LevelSetContourer {
   RunContext& context_;
   const leaf_kernels::Kernels& kernels_ = chosen_kernels<leaf_kernels::Kernels>();
   LargeArray<LeafCells> cells_;      ///< active cells of each leaf, and their numbers
-  LargeArray<Neighbours> upper_;     ///< upper neighbours of each leaf, kept because every pass needs them
+  LargeArray<Neighbours> upper_;     ///< upper neighbours of each leaf, used by every pass
   std::vector<std::uint32_t> live_;  ///< leaves with points or quads
   std::uint64_t points_ = 0, quads_ = 0;
 };
@@ -283,8 +279,8 @@ PolygonMesh contour_level_set(const LevelSet& level_set, double isovalue,
     LevelSetContourer contourer(table, sampled, placement, options, context);
     const std::vector<Position> missing = contourer.count();
     if (missing.empty()) return contourer.extract();
-    // Rare: the band is so thin, or was cut so, that a cell of the surface begins in a tile. Such a leaf
-    // brings no crossing edge of its own, so one round is enough; the loop does not rely on it.
+    // Rare: the band is so thin, or clipped so, that a cell of the surface begins in a tile. Such a leaf adds
+    // no crossing edge, so one repetition is enough; the loop does not rely on it.
     volume = with_leaves(volume, missing);
   }
 }

@@ -1,6 +1,4 @@
-// Contouring straight from the samples against the general way by Hermite data.
-#include "algorithms/extraction/dual_contouring/level_set_contouring.h"
-
+// Compares contouring directly from the samples with the general method, which uses Hermite data.
 #include <gtest/gtest.h>
 #include <openvdb/tools/Clip.h>
 #include <openvdb/tools/LevelSetSphere.h>
@@ -16,12 +14,13 @@
 #include <tuple>
 
 #include "algorithms/core/level_set_grid.h"
+#include "algorithms/extraction/dual_contouring/dual_contouring.h"
 #include "algorithms/extraction/dual_contouring/qef.h"
 #include "algorithms/hermite/samplers.h"
 #include "algorithms/lattice/simd/simd_level.h"
 
 namespace hermesh {
-namespace {
+namespace level_set_contouring_test {
 
 using openvdb::Coord;
 using openvdb::FloatGrid;
@@ -37,14 +36,14 @@ PolygonMesh straight(const LevelSet& volume, double isovalue, const DualContouri
   return contour_level_set(volume, isovalue, options, context);
 }
 
-/// OpenVDB walks its leaves node by node: 4096, 128 and 8 samples wide, each in the order of x, y and z.
+/// OpenVDB visits its leaves node by node: 4096, 128 and 8 samples wide, each in the order of x, y and z.
 auto order_in_tree(const std::array<std::int32_t, 3>& lower) {
   const auto at = [&](int bits) { return std::tuple(lower[0] >> bits, lower[1] >> bits, lower[2] >> bits); };
   return std::tuple(at(12), at(7), at(3));
 }
 
-/// Numbers of the general way's points and quads in the order of the fast one's, and the function that places
-/// a point.
+/// Indices of the general method's vertices and quads in the order of the fast one's, and the function that
+/// computes a vertex.
 class Correspondence {
  public:
   std::vector<std::uint32_t> points, quads;
@@ -71,8 +70,8 @@ class Correspondence {
     }
   }
 
-  /// Root mean square distance of a place from the planes of a cell, in voxels; both by the general way's
-  /// number.
+  /// Returns the root mean square distance of a position from the planes of a cell, in voxels; both given by
+  /// the general method's index.
   double misfit(std::uint32_t point, const Eigen::Vector3d& local) const {
     const auto [b, cell] = cells_[point];
     const HermiteView::Block& block = view_.blocks()[b];
@@ -102,9 +101,10 @@ class Correspondence {
   std::vector<std::pair<std::size_t, int>> cells_;  ///< block and cell of each point
 };
 
-/// Expects both ways to give the same quads around the same cells, but for a share of diagonals; points
-/// within 0.002 voxel. Where a place is the best of several within rounding, the other way may take another:
-/// then both must fit the planes equally well, but for a share of cells at the threshold to being let out.
+/// Expects both methods to give the same quads around the same cells, except for a share of diagonals, and
+/// vertices within 0.002 voxel. If several positions are equally good within rounding, the two methods may
+/// choose different ones: then both must fit the planes equally well, except for a share of cells at the
+/// threshold above which a vertex may leave its cell.
 void expect_same_polygons(const LevelSet& volume, double isovalue, Placement placement, std::size_t at_least,
                           double share) {
   SCOPED_TRACE(placement == Placement::average   ? "average"
@@ -156,7 +156,7 @@ FloatGrid::Ptr sphere(float radius, openvdb::Vec3f centre, float half_width = 3.
   return openvdb::tools::createLevelSetSphere<FloatGrid>(radius, centre, 1.0f, half_width);
 }
 
-/// Samples −9…13 along each axis by `value`, active where `active` says so.
+/// Samples −9…13 along each axis with the values of `value`, active if `active` returns true.
 template <class Value, class Active>
 FloatGrid::Ptr cube(float background, bool level_set, Value&& value, Active&& active) {
   const FloatGrid::Ptr grid = FloatGrid::create(background);
@@ -175,7 +175,7 @@ FloatGrid::Ptr cube(float background, bool level_set, Value&& value, Active&& ac
 
 constexpr auto kAlways = [] { return true; };
 
-/// A cube with sharp edges that no axis of the grid runs along.
+/// Returns a cube with sharp edges, none of which is parallel to an axis of the grid.
 FloatGrid::Ptr turned_cube() {
   const Eigen::Vector3d u = Eigen::Vector3d(2, 1, 2) / 3, v = Eigen::Vector3d(-2, 2, 1) / 3, w = u.cross(v);
   const FloatGrid::Ptr grid = FloatGrid::create(4.0f);
@@ -243,7 +243,7 @@ TEST_F(LevelSetContouringTest, ScatteredActiveSamplesOfAVolumeThatIsNoLevelSet) 
     }
 }
 
-/// Every edge is crossed: as many as a leaf can have, and as its lists have room for.
+/// Every edge is crossed: the most that a leaf can have, and the capacity of its lists.
 FloatGrid::Ptr checkerboard() {
   std::mt19937 random(14);
   std::uniform_real_distribution<float> size(0.2f, 1.0f);
@@ -259,7 +259,7 @@ TEST_F(LevelSetContouringTest, LeavesAllOfWhoseEdgesAreCrossed) {
 TEST_F(LevelSetContouringTest, SamplesExactlyAtTheIsovalue) {
   std::mt19937 random(5);
   const auto value = [&](int, int, int) { return float(int(random() % 3) - 1); };
-  // Diagonals are equally good here as a rule, and so are places: only quads and average points are compared.
+  // Many diagonals and positions are equally good here: only quads and average vertices are compared.
   expect_same_polygons(make_level_set(cube(2.0f, true, value, kAlways)), 0.0, Placement::average, 3000, 0.01);
 }
 
@@ -267,9 +267,9 @@ TEST_F(LevelSetContouringTest, TilesBesideSamplesOfTheOtherSignAndBesideEachOthe
   const FloatGrid::Ptr grid = FloatGrid::create(2.0f);
   grid->setGridClass(openvdb::GRID_LEVEL_SET);
   grid->tree().addTile(1, Coord(0, 0, 0), -1.5f, true);     // 8³ samples inside, within the background
-  grid->tree().addTile(1, Coord(8, 0, 0), -0.5f, false);    // beside another
+  grid->tree().addTile(1, Coord(8, 0, 0), -0.5f, false);    // adjacent to another
   grid->tree().addTile(2, Coord(128, 0, 0), -1.0f, false);  // 128³ samples
-  grid->tree().setValueOn(Coord(3, 9, 3), -0.25f);          // a leaf beside a tile
+  grid->tree().setValueOn(Coord(3, 9, 3), -0.25f);          // a leaf adjacent to a tile
   expect_same_polygons(make_level_set(grid), 0.0, Placement::average, 6 * 128 * 128, 0.0005);
 }
 
@@ -323,5 +323,5 @@ TEST_F(LevelSetContouringTest, SameBytesAtAnyLevelOfVectorCodeAndAnyThreadCount)
     }
 }
 
-}  // namespace
+}  // namespace level_set_contouring_test
 }  // namespace hermesh

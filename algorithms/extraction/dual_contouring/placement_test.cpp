@@ -1,4 +1,5 @@
-// Where points go: volumes within curved surfaces, and polyhedra, whose planes points must lie on (qef.h).
+// Positions of vertices: volumes within curved surfaces, and polyhedra, whose planes vertices must lie on
+// (qef.h).
 #include <gtest/gtest.h>
 
 #include <Eigen/Geometry>
@@ -11,7 +12,7 @@
 #include "algorithms/hermite/samplers.h"
 
 namespace hermesh {
-namespace {
+namespace placement_test {
 
 using Eigen::Vector3d;
 using Placement = DualContouringOptions::Placement;
@@ -49,7 +50,7 @@ Shape torus(double major, double minor, const Vector3d& centre) {
       2 * M_PI * M_PI * major * minor * minor};
 }
 
-/// The part by which a mesh's volume is off, of exact Hermite data.
+/// Returns the relative error of a mesh's volume, for exact Hermite data.
 double volume_error(const Shape& shape, int size, Placement placement) {
   RunContext context;
   const FloatHermite hermite =
@@ -117,8 +118,8 @@ TEST(Placement, PolyhedraAreReproducedButForSpursBesideCorners) {
           EXPECT_LT(std::abs(off), 0.2);
           spurs += std::abs(off) > 1e-5;
         }
-        // Where a cell's edges miss the third plane of a corner its point lies on the crease of two, beyond
-        // the corner.
+        // If a cell's edges miss the third plane of a corner, its vertex lies on the crease of the other two,
+        // beyond the corner.
         EXPECT_LE(spurs, 4u) << size;
       }
 }
@@ -146,5 +147,5 @@ TEST(Placement, FacesOnTheLatticesPlanesComeOutOnThem) {
   EXPECT_DOUBLE_EQ(six_volumes(mesh) / 6.0, 8.0 * 8.0 * 8.0);
 }
 
-}  // namespace
+}  // namespace placement_test
 }  // namespace hermesh

@@ -6,7 +6,6 @@
 namespace hermesh {
 
 void Qef::add_plane(const Eigen::Vector3d& point, const Eigen::Vector3d& unit_normal) {
-  // All sums are about the anchor, near which the planes are, so that no digits are lost far from the origin.
   const Eigen::Vector3d local = point - anchor_;
   const double distance = unit_normal.dot(local);
   ata_ += unit_normal * unit_normal.transpose();
@@ -22,9 +21,9 @@ double Qef::error(const Eigen::Vector3d& x) const {
   return std::max(0.0, local.dot(ata_ * local) - 2.0 * local.dot(atb_) + btb_);
 }
 
-/// True where the planes are nearly parallel, as in most cells, so that two singular values are dropped for
-/// certain. Then `axis` is the vector of the third one and `value` its square, found by a few products:
-/// whatever a start along the largest column has of the others shrinks by truncation² / 2 in each.
+/// Returns true if the planes are so nearly parallel, as in most cells, that two singular values are
+/// certainly dropped. Then `axis` is the vector of the third one and `value` its square, found by a few
+/// products: the components of the largest column along the others shrink by truncation² / 2 in each.
 bool Qef::is_flat(double truncation, Eigen::Vector3d& axis, double& value) const {
   int largest = 0;
   ata_.diagonal().maxCoeff(&largest);
@@ -36,14 +35,11 @@ bool Qef::is_flat(double truncation, Eigen::Vector3d& axis, double& value) const
   }
   axis.normalize();
   value = axis.dot(ata_ * axis);
-  // The trace is the sum of the eigenvalues, and `value` no greater than the largest: what
-  // is left bounds the other two.
+  // The trace is the sum of the eigenvalues, and `value` at most the largest: the rest bounds the other two.
   return ata_.trace() - value < 0.5 * truncation * truncation * value;
 }
 
 bool Qef::planes_meet(const Eigen::Vector3d& free, const Eigen::Vector3d& held) const {
-  // All but the first test are of sums of squares: a sum bounds its largest term, so no plane is farther than
-  // the root.
   const double least = error(free), there = error(held);
   return turned() >= kFeature && least <= kMeet * kMeet && there > kApart * kApart && there > 100.0 * least;
 }
@@ -66,7 +62,7 @@ double Qef::share_of_minimiser(double smooth, double truncation) const {
 Eigen::Vector3d Qef::minimiser_near(const Eigen::Vector3d& start, double truncation) const {
   Eigen::Vector3d axis;
   double value;
-  // A step along the one axis that is kept; across it the start stays where it is.
+  // A step along the one axis that is not dropped.
   if (is_flat(truncation, axis, value))
     return start + axis.dot(atb_ - ata_ * (start - anchor_)) / value * axis;
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(ata_);
@@ -84,11 +80,9 @@ Eigen::Vector3d Qef::minimiser_within(const Eigen::Vector3d& lower, const Eigen:
   const Eigen::Vector3d free = minimiser(truncation);
   if ((free.array() >= lower.array()).all() && (free.array() <= upper.array()).all()) return free;
 
-  // Every way of holding one to three coordinates at a side of the box; the others stay free and are solved
-  // for.
+  // All choices of one to three coordinates held at a side of the box; the others are solved for.
   const Eigen::Vector3d low = lower - anchor_, high = upper - anchor_;
-  // Free coordinates start at the mass point, moved into the box. It also is the answer where no choice is
-  // better.
+  // Free coordinates start at the mass point, moved into the box, which is the result if no choice is better.
   const Eigen::Vector3d mass = (sum_ / planes_).cwiseMax(low).cwiseMin(high);
   Eigen::Vector3d best = mass;
   double best_error = error(anchor_ + mass);
@@ -117,8 +111,7 @@ Eigen::Vector3d Qef::minimiser_within(const Eigen::Vector3d& lower, const Eigen:
         for (int i = 0; i < count; ++i) x[axes[i]] += along * solver.eigenvectors()(i, k);
       }
     }
-    // A minimum outside of the box is passed over: the box's own then lies on one more
-    // side, which another choice holds.
+    // A minimum outside of the box is skipped: the box's own then lies on one more side, in another choice.
     if ((x.array() < low.array()).any() || (x.array() > high.array()).any()) continue;
     const double candidate = error(anchor_ + x);
     if (candidate < best_error) best = x, best_error = candidate;

@@ -8,7 +8,7 @@
 #include <random>
 
 namespace hermesh {
-namespace {
+namespace qef_test {
 
 using Eigen::Vector3d;
 
@@ -63,7 +63,7 @@ TEST(Qef, WithinTheBoxNoSampledPointIsBetter) {
   }
 }
 
-/// Planes of the bowl z = k (x² + y²) / 2 at places (x, y).
+/// Planes of the bowl z = k (x² + y²) / 2 at positions (x, y).
 Qef bowl(double k, std::initializer_list<std::array<double, 2>> places) {
   Qef qef(Vector3d::Zero());
   for (const auto& [x, y] : places)
@@ -96,7 +96,7 @@ TEST(Qef, TheShareRisesFromSmoothSurfacesToFeatures) {
     EXPECT_GE(share(k + 0.001), share(k));
     EXPECT_LT(share(k + 0.001), share(k) + 0.02);
   }
-  // An edge, seen by one plane of five.
+  // An edge between two faces, one of which has only one plane of the five.
   Qef edge(Vector3d::Zero());
   for (int i = 0; i < 4; ++i) edge.add_plane(Vector3d(0.1 * i, 0, 0), Vector3d::UnitZ());
   edge.add_plane(Vector3d(0.4, 0, -0.2), Vector3d::UnitX());
@@ -104,5 +104,5 @@ TEST(Qef, TheShareRisesFromSmoothSurfacesToFeatures) {
   EXPECT_EQ(edge.share_of_minimiser(smooth, 0.0), 1.0);
 }
 
-}  // namespace
+}  // namespace qef_test
 }  // namespace hermesh

@@ -11,14 +11,14 @@
 namespace hermesh {
 namespace {
 
-/// Whether all crossings of an ambiguous face belong to one sheet.
+/// Returns true if all crossings of an ambiguous face belong to one sheet.
 bool has_one_sheet(const CellSheets& sheets, int face) {
   const std::array<int, 4> edges = face_edges(face);
   return std::ranges::all_of(edges,
                              [&](int edge) { return sheets.sheet_of[edge] == sheets.sheet_of[edges[0]]; });
 }
 
-/// Whether every other corner is inside: to join several faces of such a cell could leave loops that no plane
+/// Returns true for alternating corners. Joining several faces of such a cell could leave loops that no plane
 /// separates (cell_sheets.h).
 bool is_checkerboard(int signs) { return kCellSheets[signs].sheets == 4; }
 
@@ -30,7 +30,7 @@ CellBlocks::CellBlocks(const CellGrid& grid, RunContext& context)
       rounding_(rounding_in_file()),
       margin_(margin_for_rounding()),
       cuts_(grid.cuts()),
-      told_(grid.joint_sheets()),
+      given_(grid.joint_sheets()),
       blocks_(grid.blocks().size()),
       joined_sheets_(blocks_.size()),
       several_(blocks_.size()) {
@@ -40,8 +40,7 @@ CellBlocks::CellBlocks(const CellGrid& grid, RunContext& context)
     is_plain[signs] = kCellSheets[signs].sheets == 1 && kCellSheets[signs].ambiguous_faces == 0;
   const std::size_t n = blocks_.size();
   std::vector<std::uint64_t> codes(n), points(n);
-  // Count, scan, fill (core/parallel.h): each block finds its active cells by itself, and a prefix sum
-  // numbers them, so that numbers do not depend on threads.
+  // Count, scan, fill (core/parallel.h), so that the numbers do not depend on the thread schedule.
   std::vector<std::vector<std::uint8_t>> found(n);
   parallel_blocks(n, context, [&](std::size_t b) {
     Block& block = blocks_[b] = {};
@@ -49,8 +48,7 @@ CellBlocks::CellBlocks(const CellGrid& grid, RunContext& context)
     block.joints = cells_with_cuts(static_cast<std::int32_t>(b));
     for (int word = 0; word < 8; ++word) {
       std::uint64_t all = ~std::uint64_t{0}, some = 0;
-      // Active are cells whose corners differ, eight words at a time, and joints: the ends of a cut may both
-      // be inside.
+      // Active cells have corners of both signs, or are joints: both ends of a cut may be inside.
       for (const BlockMask& corner : signs) all &= corner[word], some |= corner[word];
       block.active[word] = (some & ~all) | block.joints[word];
     }
@@ -60,8 +58,7 @@ CellBlocks::CellBlocks(const CellGrid& grid, RunContext& context)
       int code = 0;
       for (int c = 0; c < 8; ++c) code |= test(signs[c], cell) << c;
       found[b].push_back(static_cast<std::uint8_t>(code));
-      if (!is_plain[static_cast<std::size_t>(code)])
-        block.special[static_cast<std::size_t>(cell >> 6)] |= std::uint64_t{1} << (cell & 63);
+      if (!is_plain[code]) block.special[cell >> 6] |= std::uint64_t{1} << (cell & 63);
     });
     for (std::size_t word = 0; word < 8; ++word) block.special[word] |= block.joints[word];
   });
@@ -71,10 +68,10 @@ CellBlocks::CellBlocks(const CellGrid& grid, RunContext& context)
     const std::vector<std::uint8_t> own = std::move(found[b]);  // freed here, in parallel
     std::ranges::copy(own, codes_.begin() + static_cast<std::ptrdiff_t>(codes[b]));
   });
-  // How faces are cut decides how many sheets a cell has, so it comes before points are numbered.
+  // Before vertices are numbered, because the drawing of faces determines the number of sheets.
   draw_ambiguous_faces(context);
-  // A first sheet's point has its cell's number within the block, which plain_points() relies on; the points
-  // of further sheets come behind. Only special cells can have such.
+  // The vertex of a first sheet has the cell's rank in the block, which plain_points() relies on; those of
+  // further sheets, which only special cells have, follow.
   parallel_blocks(n, context, [&](std::size_t b) {
     std::uint16_t later = 0;
     for_each_bit(blocks_[b].special, [&](int cell) {
@@ -89,22 +86,22 @@ CellBlocks::CellBlocks(const CellGrid& grid, RunContext& context)
   for (std::size_t b = 0; b < n; ++b) blocks_[b].first_point = static_cast<std::uint32_t>(points[b]);
 }
 
-/// Cuts ambiguous faces first as the normals say, and then those that are pinched the other way. The second
-/// pass takes one face after the other, for what is done to one may help the next one of its cells; and one
-/// such pass is enough, for it parts sheets and joins none.
+/// Draws ambiguous faces as the normals indicate, then reverses those that are pinched. The second pass
+/// handles one face after another, since reversing one may resolve the next one of its cells; one pass is
+/// sufficient, because it splits sheets and joins none.
 void CellBlocks::draw_ambiguous_faces(RunContext& context) {
   struct Face {
     std::int32_t block;
     int cell, face;
-    bool joined;  ///< the normals say so
+    bool joined;  ///< according to the normals
   };
   std::vector<std::vector<Face>> faces(blocks_.size());
   parallel_blocks(blocks_.size(), context, [&](std::size_t b) {
     const auto block = static_cast<std::int32_t>(b);
     for_each_bit(blocks_[b].special, [&](int cell) {
       // Each face once, as an upper face of the cell below it. Nothing is marked as joined yet, so sheets()
-      // is that of kCellSheets for all cells without a cut. Faces of joints stay as they are: the lattice
-      // draws both of their sides (fracture/label_repair.h).
+      // returns kCellSheets for all cells without a cut. Faces of joints stay unchanged: the lattice draws
+      // both of their sides (fracture/label_repair.h).
       for (int face = 1; face < 6; face += 2) {
         if (!((sheets(block, cell).ambiguous_faces >> face) & 1)) continue;
         const Cell upper = beside(block, cell, face);
@@ -119,13 +116,12 @@ void CellBlocks::draw_ambiguous_faces(RunContext& context) {
     return joined[cell_number(at.block, at.cell)];
   };
   const auto code = [&](const Cell& at) { return codes_[cell_number(at.block, at.cell)]; };
-  // Both cells beside a face note how it is cut, so their segments on it agree and the surface stays closed.
+  // Both cells at a face record its drawing, so their segments on it agree and the surface stays closed.
   const auto cut_the_other_way = [&](const Cell& lower, const Cell& upper, int face) {
     joined_faces(lower) ^= static_cast<std::uint8_t>(1 << face);
     joined_faces(upper) ^= static_cast<std::uint8_t>(1 << (face ^ 1));
   };
-  // Both passes run in one thread, in the order of blocks, cells and faces: the second one's outcome depends
-  // on it.
+  // Both passes are sequential, by block, cell and face: the result of the second depends on the order.
   for (const auto& list : faces)
     for (const auto& [block, cell, face, join] : list) {
       const Cell lower{block, cell}, upper = beside(block, cell, face);
@@ -135,12 +131,12 @@ void CellBlocks::draw_ambiguous_faces(RunContext& context) {
   for (const auto& list : faces)
     for (const auto& [block, cell, face, join] : list) {
       const Cell lower{block, cell}, upper = beside(block, cell, face);
-      // The sheets as all faces are cut by now, those that this pass has turned included.
+      // With all faces as drawn so far, including those reversed by this pass.
       const auto sheets_of = [&](const Cell& at) { return cell_sheets(code(at), joined_faces(at)); };
       if (has_one_sheet(sheets_of(lower), face) && has_one_sheet(sheets_of(upper), face ^ 1))
         cut_the_other_way(lower, upper, face);
     }
-  // Only cells that differ from kCellSheets keep sheets of their own: few cells, except in noise.
+  // Cells that differ from kCellSheets are few, except in noise; only they store their sheets.
   parallel_blocks(blocks_.size(), context, [&](std::size_t b) {
     for_each_bit(blocks_[b].special, [&](int cell) {
       const std::size_t at = cell_number(static_cast<std::int32_t>(b), cell);
@@ -152,8 +148,8 @@ void CellBlocks::draw_ambiguous_faces(RunContext& context) {
   });
 }
 
-/// Whether the normals say that the inside corners of an ambiguous face are joined: whether the pair of
-/// segments that cuts off the outside corners lies better in the tangent planes through its ends. The
+/// Returns true if the normals indicate that the inside corners of an ambiguous face are joined, i.e. if the
+/// pair of segments that cuts off the outside corners fits the tangent planes at its ends better. The
 /// segments of an edge or of a thin wall run along it, whatever the distances along the lattice's edges are.
 bool CellBlocks::normals_join(std::int32_t block, int cell, int face) const {
   const std::array<int, 4> edges = face_edges(face), corners = face_corners(face);
@@ -164,18 +160,17 @@ bool CellBlocks::normals_join(std::int32_t block, int cell, int face) const {
     points[i] = crossing_point(edge, crossing);
     normals[i] = {crossing.normal[0], crossing.normal[1], crossing.normal[2]};
   }
-  // How far a segment between two crossings leaves the planes there: the sum of two sines.
+  // The deviation of a segment between two crossings from the planes at its ends: the sum of two sines.
   const auto slant = [&](int i, int j) {
     const Eigen::Vector3d along = (points[j] - points[i]).normalized();
     return std::abs(normals[i].dot(along)) + std::abs(normals[j].dot(along));
   };
-  const int inside =
-      (codes_[cell_number(block, cell)] >> corners[0]) & 1 ? 0 : 1;  // one of the corners that are
-  // The two edges that meet in a corner are the one before it and its own; the corner opposite is two on.
+  const int inside = (codes_[cell_number(block, cell)] >> corners[0]) & 1 ? 0 : 1;  // one inside corner
+  // The edges at a corner are the one before it and its own; the opposite corner is two further on.
   const auto cut_off = [&](int corner) {
     return slant((corner + 3) % 4, corner % 4) + slant((corner + 1) % 4, (corner + 2) % 4);
   };
-  // Strictly: without normals both are zero, and the inside corners are cut off.
+  // Strict, because without normals both are zero and the inside corners are cut off.
   return cut_off(inside + 1) < cut_off(inside);
 }
 
@@ -192,26 +187,20 @@ CellBlocks::Cell CellBlocks::beside(std::int32_t block, int cell, int face) cons
   return locate(block, at[0], at[1], at[2]);
 }
 
-/// The cells of a block that have a cut: along each axis those are the cells that a cut starts from, at any
-/// of the four corners of offset 0 along it.
 BlockMask CellBlocks::cells_with_cuts(std::int32_t b) const {
   if (cuts_.empty()) return {};
   return cells_with_edges(
-      source_, static_cast<std::size_t>(b), [&](std::int32_t there) -> const auto& {
-        return cuts_[static_cast<std::size_t>(there)];
-      });
+      source_, b, [&](std::int32_t there) -> const auto& { return cuts_[there]; });
 }
 
-/// Signs of the corners of every cell of a block, from the first corner's and the crossings on the way that
-/// are no cuts. So no block is asked for its signs but this one, and the upper samples may be where there is
-/// no block.
+// From the signs of the first corners and the crossed edges that are not cuts, so that the signs of no other
+// block are needed, and upper samples may lie where there is no block.
 std::array<BlockMask, 8> CellBlocks::corner_signs(std::int32_t b) const {
-  static constexpr BlockMask kNone{};
   const HermiteView::Block& block = source_[b];
   const auto crossed = [&](int axis, int dx, int dy, int dz) {
     return shifted_mask(dx, dy, dz, [&](int ax, int ay, int az) -> BlockMask {
       const std::int32_t there = block.neighbours[neighbour_slot(ax, ay, az)];
-      if (there < 0) return kNone;
+      if (there < 0) return {};
       BlockMask edges = source_[there].crossing[axis];
       if (!cuts_.empty())
         for (int word = 0; word < 8; ++word) edges[word] &= ~cuts_[there][axis][word];
@@ -225,7 +214,7 @@ std::array<BlockMask, 8> CellBlocks::corner_signs(std::int32_t b) const {
     BlockMask& to = signs[from | 1 << axis];
     for (int word = 0; word < 8; ++word) to[word] = signs[from][word] ^ edges[word];
   };
-  // Seven steps from corner to corner reach all of them; each starts from one whose signs are known.
+  // Seven steps along the edges of a cell reach all corners; each starts from a known one.
   step(0, 0), step(0, 1), step(0, 2), step(1, 1), step(1, 2), step(2, 2), step(3, 2);
   return signs;
 }
@@ -234,7 +223,7 @@ Eigen::Vector3d CellBlocks::rounding_in_file() const {
   const IndexToWorld& placement = grid_.placement();
   Eigen::Vector3d farthest =
       Eigen::Vector3d::Zero();  // from the meshes' origin, along each axis of the world
-  // The farthest corner along each axis of the world, for rounding grows with the coordinate.
+  // Rounding grows with the coordinate, so the farthest corner along each axis of the world counts.
   const auto include = [&](const Eigen::Vector3d& lower, const Eigen::Vector3d& upper) {
     for (int corner = 0; corner < 8; ++corner) {
       Eigen::Vector3d index = lower;
@@ -248,39 +237,32 @@ Eigen::Vector3d CellBlocks::rounding_in_file() const {
                            block.lower[2] - placement.base[2]);
   };
   const Eigen::Vector3d side = Eigen::Vector3d::Constant(8);
-  if (placement.linear.isDiagonal(0)) {  // the farthest along each axis are those of the box about all blocks
+  if (placement.linear.isDiagonal(0)) {  // then the corners of the bounding box suffice
     Eigen::AlignedBox3d box;
     for (const HermiteView::Block& block : source_) box.extend(lower_of(block));
     if (!box.isEmpty()) include(box.min(), box.max() + side);
   } else {
     for (const HermiteView::Block& block : source_) include(lower_of(block), lower_of(block) + side);
   }
-  // Of single precision about the origin, and of double precision where the file's coordinates lie
-  // (FilePoints).
+  // Single precision about the origin, and double precision of the file's coordinates (FilePoints).
   const Eigen::Vector3d in_world = farthest * 0x1p-24 + (placement.origin.cwiseAbs() + farthest) * 0x1p-53;
-  // Back to voxels: no place moves farther along an axis of the lattice than its row of magnitudes allows.
+  // In voxels: the magnitudes of the rows bound the movement along each axis of the lattice.
   return placement.linear.inverse().cwiseAbs() * in_world;
 }
 
 double CellBlocks::margin_for_rounding() const {
   const double margin = std::max(1.0 / 1024.0, 8.0 * rounding_.maxCoeff());
-  static_assert(kLargestMargin == 0.25);  // eight times what the error names
-  if (!(margin <= kLargestMargin))
+  if (!(margin <= 0.25))  // eight times the precision in the message
     throw Error(
-        "the coordinates of a mesh file cannot hold a mesh of this volume to a thirty-second of a voxel, so "
-        "nothing can be promised of it: its axes lie nearly in a plane, or it reaches too far, or lies too "
-        "far from "
-        "the origin; resample, divide or move it, or use --extractor dual-contouring");
+        "the coordinates of a mesh file cannot represent a mesh of this volume to 1/32 voxel, so no "
+        "guarantee is "
+        "possible: its axes lie nearly in a plane, or it is too large, or too far from the origin; resample, "
+        "divide "
+        "or move it, or use --extractor dual-contouring");
   return margin;
 }
 
-/// The entry of a cell that is in the list.
-const CellSheets& CellBlocks::find(const SheetsOfBlock& list, int cell) {
-  return std::ranges::lower_bound(list, cell, {}, [](const auto& entry) { return int(entry.first); })->second;
-}
-
-const CellSheets* CellBlocks::find_told(std::int32_t block, int cell) const {
-  const SheetsOfBlock& list = told_[static_cast<std::size_t>(block)];
+const CellSheets* CellBlocks::find(const SheetsOfBlock& list, int cell) {
   const auto at =
       std::ranges::lower_bound(list, cell, {}, [](const auto& entry) { return int(entry.first); });
   return at != list.end() && at->first == cell ? &at->second : nullptr;
@@ -289,10 +271,10 @@ const CellSheets* CellBlocks::find_told(std::int32_t block, int cell) const {
 std::uint32_t CellBlocks::point(std::int32_t number, int cell, int sheet) const {
   const Block& block = blocks_[number];
   if (sheet == 0) return block.first_point + rank_of(block, cell);
-  // Behind the points of all first sheets come those of further sheets, in the order of cells and sheets.
+  // Further sheets follow all first sheets, in the order of cells and sheets.
   const auto& several = several_[number];
-  const auto at = std::lower_bound(several.begin(), several.end(), cell,
-                                   [](const auto& entry, int wanted) { return entry.first < wanted; });
+  const auto at =
+      std::ranges::lower_bound(several, cell, {}, [](const auto& entry) { return int(entry.first); });
   return block.first_point + cells_in(number) + at->second + static_cast<std::uint32_t>(sheet - 1);
 }
 
@@ -311,10 +293,9 @@ CellBlocks::Edge CellBlocks::edge_of_cell(std::int32_t block, int cell, int edge
 
 int CellBlocks::crossings_on(const Edge& first, int length) const {
   if (first.block < 0) return 0;
-  const BlockMask& crossing = source(first.block).crossing[static_cast<std::size_t>(first.axis)];
+  const BlockMask& crossing = source(first.block).crossing[first.axis];
   const int word = first.sample >> 6, bit = first.sample & 63;
-  // A mask has a word for each x, in it a row of eight bits for each y: edges along x are 64 bits apart,
-  // along y eight, and along z they follow one another.
+  // A mask has a word per x with a row of eight bits per y: edges along x are 64 bits apart, along y eight.
   if (first.axis == 0) {
     int found = 0;
     for (int k = 0; k < length; ++k) found += test(crossing, first.sample + 64 * k);
@@ -322,12 +303,11 @@ int CellBlocks::crossings_on(const Edge& first, int length) const {
   }
   const std::uint64_t line =
       first.axis == 1 ? 0x0101010101010101u >> (8 * (8 - length)) : 0xffu >> (8 - length);
-  return std::popcount((crossing[static_cast<std::size_t>(word)] >> bit) & line);
+  return std::popcount((crossing[word] >> bit) & line);
 }
 
 Eigen::Vector3d CellBlocks::crossing_point(const Edge& edge, const EdgeCrossing& crossing) const {
   Eigen::Vector3d point = corner(edge.block, edge.sample);
-  // Off the ends of the edge, so that the crossing stays on it when it is rounded for the file.
   point[edge.axis] += std::clamp(double(crossing.offset), margin_, 1.0 - margin_);
   return point;
 }
@@ -339,8 +319,7 @@ CellBlocks::Around CellBlocks::around(const Edge& edge) const {
     const Cell cell = cell_around(edge, i);
     result.cells[i] = cell;
     result.sheets[i] = &sheets(cell.block, cell.cell);
-    // A cell of one sheet has one point, whatever edge asks.
-    const CellSheets& loops = *result.sheets[i];  // of a joint of one point they do not tell of its cuts
+    const CellSheets& loops = *result.sheets[i];  // those of a joint of one vertex ignore its cuts
     result.points[i] =
         point(cell.block, cell.cell, loops.sheets > 1 ? loops.sheet_of[edge_in(edge.axis, i)] : 0);
   }
@@ -348,7 +327,6 @@ CellBlocks::Around CellBlocks::around(const Edge& edge) const {
 }
 
 CellBlocks::Edge CellBlocks::other_end(const Around& around, int i) const {
-  // The cells i and i + 1 draw the same segments on the face between them, so either may be asked.
   const int other = around.sheets[i]->partner[face_after(around.axis, i)][edge_in(around.axis, i)];
   return edge_of_cell(around.cells[i].block, around.cells[i].cell, other);
 }
@@ -366,13 +344,12 @@ bool CellBlocks::has_explicit_face(std::int32_t block, int cell) const {
 }
 
 bool CellBlocks::comes_first(const Edge& a, const Edge& b) const {
-  // By coordinates and not by block numbers: the order is then one of the lattice itself.
-  const auto place = [&](const Edge& edge) {
+  const auto key = [&](const Edge& edge) {
     const auto& lower = source_[edge.block].lower;
     return std::array{lower[0] + (edge.sample >> 6), lower[1] + ((edge.sample >> 3) & 7),
                       lower[2] + (edge.sample & 7), std::int32_t(edge.axis)};
   };
-  return place(a) < place(b);
+  return key(a) < key(b);
 }
 
 }  // namespace hermesh

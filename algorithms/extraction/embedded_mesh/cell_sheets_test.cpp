@@ -5,7 +5,7 @@
 #include <algorithm>
 
 namespace hermesh {
-namespace {
+namespace cell_sheets_test {
 
 TEST(CellSheets, CountsKnownByHand) {
   EXPECT_EQ(kCellSheets[0b00000000].sheets, 0);
@@ -139,5 +139,5 @@ TEST(CellSheets, APlaneSeparatesEveryTwoLoops) {
   EXPECT_GT(pairs, 250);
 }
 
-}  // namespace
+}  // namespace cell_sheets_test
 }  // namespace hermesh

@@ -8,11 +8,6 @@ namespace {
 
 using Eigen::Vector3d;
 
-void set(BlockMask& mask, int sample, bool value = true) {
-  const std::uint64_t bit = std::uint64_t{1} << (sample & 63);
-  mask[sample >> 6] = value ? mask[sample >> 6] | bit : mask[sample >> 6] & ~bit;
-}
-
 std::vector<CellBlocks::Cell> listed(const ByBlock<BlockMask>& masks) {
   std::vector<CellBlocks::Cell> cells;
   for (std::size_t b = 0; b < masks.size(); ++b)
@@ -22,16 +17,30 @@ std::vector<CellBlocks::Cell> listed(const ByBlock<BlockMask>& masks) {
 
 }  // namespace
 
+void PlainPoints::read(const CellBlocks& cells, std::int32_t block) {
+  for (int slot = 0; slot < 8; ++slot) {
+    const int d[3] = {slot & 1, (slot >> 1) & 1, slot >> 2};  // downwards
+    const std::int32_t there = cells.source(block).neighbours[neighbour_slot(-d[0], -d[1], -d[2])];
+    if (there < 0) continue;
+    const std::uint64_t rows = last_layers(d[1], d[2]);
+    const CellBlocks::Block& own = cells[there];
+    for (int x = d[0] ? 7 : 0; x < 8; ++x)
+      for (std::uint64_t word = own.active[x] & rows; word != 0; word &= word - 1) {
+        const int bit = std::countr_zero(word), cell = 64 * x + bit;
+        point_[at(x - 8 * d[0], (bit >> 3) - 8 * d[1], (bit & 7) - 8 * d[2])] =
+            cells.is_plain(there, cell) ? own.first_point + rank_of(own, cell) : kNone;
+      }
+  }
+}
+
 EdgePolygons::EdgePolygons(const CellBlocks& cells, const UniformPoints& points, const EdgeMasks* only,
                            RunContext& context)
     : cells_(cells), only_(only), edges_(cells.size()), held_(cells.size()), centred_(cells.size()) {
-  // Each block decides for its own edges and writes nothing else, by points of cells that are all there: so
-  // the result does not depend on threads.
   parallel_blocks(cells_.size(), context, [&](std::size_t b) {
     const auto block = static_cast<std::int32_t>(b);
     if (only_ && !only_->has(b)) return;
-    // Nearly all edges lie among plain cells. Their points are looked up once for the block, and crossings
-    // are read in one go: both are asked for by the order of edges.
+    // Nearly all edges lie among plain cells, whose vertices are looked up once for the block. Crossings are
+    // read at once, too, in the order of edges.
     PlainPoints near;
     near.read(cells_, block);
     std::array<EdgeCrossing, 3 * 512> crossings;
@@ -59,25 +68,25 @@ bool EdgePolygons::is_crowded(const CellBlocks::Cell& cell) const {
 
 void EdgePolygons::hold(const std::vector<CellBlocks::Cell>& cells, const UniformPoints& points,
                         RunContext& context) {
-  // All are marked before any edge decides: an edge looks at all four cells around it. Edges of one cell may
-  // be in several blocks, so this runs in one thread; there are few such cells.
-  for (const CellBlocks::Cell& cell : cells) set(held_.at(static_cast<std::size_t>(cell.block)), cell.cell);
+  // All are marked before any edge is decided, as that depends on all four cells around it. Sequential,
+  // because the edges of a cell may be in several blocks; there are few such cells.
+  for (const auto& [block, cell] : cells) set_bit(held_.at(block), cell);
   decide_again(cells, points, context);
 }
 
 void EdgePolygons::decide_again(const std::vector<CellBlocks::Cell>& cells, const UniformPoints& points,
                                 RunContext& context) {
   for (const CellBlocks::Cell& cell : cells)
-    for (int edge = 0; edge < 12; ++edge)
-      if (const CellBlocks::Edge at = cells_.edge_of_cell(cell.block, cell.cell, edge); cells_.is_crossed(at))
-        decide(at, cells_.grid().crossing(at.block, at.sample, at.axis).offset, points);
+    cells_.for_each_crossed_edge_of(cell, [&](const CellBlocks::Edge& at) {
+      decide(at, cells_.grid().crossing(at.block, at.sample, at.axis).offset, points);
+    });
   number_all(context);
 }
 
 std::vector<CellBlocks::Cell> EdgePolygons::held_cells() const { return listed(held_); }
 
 void EdgePolygons::centre(const std::vector<CellBlocks::Cell>& cells) {
-  for (const auto& [block, cell] : cells) set(centred_.at(static_cast<std::size_t>(block)), cell);
+  for (const auto& [block, cell] : cells) set_bit(centred_.at(block), cell);
 }
 
 std::vector<CellBlocks::Cell> EdgePolygons::centred_cells() const { return listed(centred_); }
@@ -90,21 +99,22 @@ Vector3d EdgePolygons::crossing_position(const CellBlocks::Edge& edge) const {
 }
 
 void EdgePolygons::number_all(RunContext& context) {
-  // Count, scan: each block's first numbers follow from how many the blocks before it have.
   const std::size_t blocks = cells_.size();
   std::vector<std::uint64_t> crossing_points(blocks), quads(blocks), triangles(blocks);
   parallel_blocks(blocks, context, [&](std::size_t b) {
     const auto block = static_cast<std::int32_t>(b);
     for (int axis = 0; axis < 3; ++axis) {
-      const BlockMask& fanned = edges_[b].fanned[static_cast<std::size_t>(axis)];
-      const int fans = count(fanned), all = count(edges(block, axis));
-      crossing_points[b] += static_cast<std::uint64_t>(fans);
-      quads[b] += static_cast<std::uint64_t>(all - fans);
-      // An edge without explicit faces has four triangles, one that speaks for its segments more, others
-      // fewer.
-      for_each_bit(fanned, [&](int sample) {
+      const int fans = count(fanned(block, axis));
+      crossing_points[b] += fans;
+      quads[b] += count(edges(block, axis)) - fans;
+      // A fan has a triangle for each of its four faces; at an explicit face two or none.
+      for_each_bit(fanned(block, axis), [&](int sample) {
         const CellBlocks::Edge edge{block, sample, axis};
-        triangles[b] += static_cast<std::uint64_t>(fan_size(edge, cells_.around(edge)));
+        const CellBlocks::Around around = cells_.around(edge);
+        for (int i = 0; i < 4; ++i)
+          triangles[b] += !is_explicit(around, i)                                 ? 1
+                          : cells_.comes_first(edge, cells_.other_end(around, i)) ? 2
+                                                                                  : 0;
       });
     }
   });
@@ -122,58 +132,37 @@ void EdgePolygons::number_all(RunContext& context) {
   }
 }
 
-/// How many triangles polygons_of() makes of a fanned edge: 0 where the other ends of its segments speak for
-/// all of them.
-int EdgePolygons::fan_size(const CellBlocks::Edge& edge, const CellBlocks::Around& around) const {
-  int made = 0;
-  for (int i = 0; i < 4; ++i) {
-    if (!is_explicit(around, i))
-      ++made;
-    else if (cells_.comes_first(edge, cells_.other_end(around, i)))
-      made += 2;
-  }
-  return made;
-}
-
 void EdgePolygons::decide(const CellBlocks::Edge& edge, double hit, const UniformPoints& points,
                           const PlainPoints* near) {
-  BlockEdges& edges = of(edge.block);
+  BlockEdges& edges = edges_.at(edge.block);
   std::array<std::uint32_t, 4> corners;
   bool any_explicit = false;
-  // Explicit faces are only found beside cells that are not plain.
+  // Only cells that are not plain have explicit faces.
   if (!(near ? near->around(edge, corners) : cells_.plain_points(edge, corners))) {
     const CellBlocks::Around around = cells_.around(edge);
     for (int i = 0; i < 4; ++i) any_explicit = any_explicit || is_explicit(around, i);
     corners = around.points;
   }
-  const int diagonal = any_explicit ? -1 : safe_diagonal(edge, hit, corners, points);
-  // Both bits are written, so that the answer depends on points and held cells only, not on earlier answers.
-  set(edges.fanned[edge.axis], edge.sample, diagonal < 0);
-  set(edges.second_diagonal[edge.axis], edge.sample, diagonal == 1);
-}
-
-/// The diagonal to cut a quad along, 0 or 1; −1 if neither keeps the triangles in the envelope.
-int EdgePolygons::safe_diagonal(const CellBlocks::Edge& edge, double hit,
-                                const std::array<std::uint32_t, 4>& corners,
-                                const UniformPoints& points) const {
-  // The edge is one voxel long, so its own frame needs no scaling.
-  const Vector3d start = cells_.corner(edge.block, edge.sample);
-  std::array<EnvelopeCorner, 4> r;
-  for (std::size_t i = 0; i < 4; ++i) {
-    const Vector3d p = points[corners[i]] - start;
-    r[i] = {p[(edge.axis + 1) % 3], p[(edge.axis + 2) % 3], p[edge.axis]};
+  EnvelopeCut cut;
+  if (!any_explicit) {
+    const Vector3d start = cells_.corner(edge.block, edge.sample);
+    std::array<EnvelopeCorner, 4> r;
+    for (int i = 0; i < 4; ++i) {
+      const Vector3d p = points[corners[i]] - start;
+      r[i] = {p[(edge.axis + 1) % 3], p[(edge.axis + 2) % 3], p[edge.axis]};
+    }
+    cut = cut_quad(r, hit);
   }
-  const EnvelopeCut cut = cut_quad(r, hit);
-  return cut.fanned ? -1 : cut.diagonal;
+  // Both bits are written, so that the result does not depend on earlier decisions.
+  set_bit(edges.fanned[edge.axis], edge.sample, cut.fanned);
+  set_bit(edges.second_diagonal[edge.axis], edge.sample, !cut.fanned && cut.diagonal == 1);
 }
 
 std::uint32_t EdgePolygons::crossing_point(const CellBlocks::Edge& edge) const {
-  const BlockEdges& edges = of(edge.block);
-  // Points on fanned edges are numbered by block, axis and sample.
-  std::uint32_t number = edges.first_crossing_point;
-  for (int axis = 0; axis < edge.axis; ++axis)
-    number += static_cast<std::uint32_t>(count(edges.fanned[axis]));
-  return number + rank_in(edges.fanned[edge.axis], edge.sample);
+  // Numbered by block, axis and sample.
+  std::uint32_t number = edges_[edge.block].first_crossing_point;
+  for (int axis = 0; axis < edge.axis; ++axis) number += count(fanned(edge.block, axis));
+  return number + rank_in(fanned(edge.block, edge.axis), edge.sample);
 }
 
 }  // namespace hermesh

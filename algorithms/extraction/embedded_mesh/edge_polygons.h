@@ -1,5 +1,5 @@
-// The polygons of each crossing edge of a lattice: a quad of the points of its four cells, or a fan
-// (uniform_mesh.h says why no two of them meet).
+// The polygons of each crossed edge of a lattice: a quad of the vertices of its four cells, or a fan
+// (uniform_mesh.h explains why no two of them intersect).
 #pragma once
 
 #include <array>
@@ -8,81 +8,98 @@
 #include <vector>
 
 #include "algorithms/core/polygon_mesh.h"
-#include "algorithms/extraction/embedded_mesh/by_block.h"
 #include "algorithms/extraction/embedded_mesh/cell_blocks.h"
-#include "algorithms/extraction/embedded_mesh/plain_points.h"
 #include "algorithms/extraction/embedded_mesh/uniform_points.h"
 
 namespace hermesh {
 
-/// Edges of a lattice as bits: for each block and axis a bit for each first sample.
+/// A set of edges of a lattice: by block and axis, one bit per first sample.
 using EdgeMasks = ByBlock<std::array<BlockMask, 3>>;
 
-/// What each crossing edge becomes, a quad or a fan, and the numbers of points and polygons that follow from
-/// it. Points are those of CellBlocks, and behind them one for each fanned edge, at its crossing.
+inline void set_bit(BlockMask& mask, int sample, bool value = true) {
+  const std::uint64_t bit = std::uint64_t{1} << (sample & 63);
+  mask[sample >> 6] = value ? mask[sample >> 6] | bit : mask[sample >> 6] & ~bit;
+}
+
+/// The vertices of the plain cells in and just below a block, looked up once for all of its edges. One object
+/// serves many blocks in turn.
+class PlainPoints {
+ public:
+  /// Looks up the vertices for the edges of a block.
+  void read(const CellBlocks& cells, std::int32_t block);
+  /// Does the same as CellBlocks::plain_points(), for a crossed edge of the block that was read.
+  bool around(const CellBlocks::Edge& edge, std::array<std::uint32_t, 4>& points) const {
+    constexpr int kStep[3] = {81, 9, 1};
+    const int first = at(edge.sample >> 6, (edge.sample >> 3) & 7, edge.sample & 7);
+    const int u = kStep[(edge.axis + 1) % 3], v = kStep[(edge.axis + 2) % 3];
+    points = {point_[first - u - v], point_[first - v], point_[first], point_[first - u]};
+    return points[0] != kNone && points[1] != kNone && points[2] != kNone && points[3] != kNone;
+  }
+
+ private:
+  static constexpr std::uint32_t kNone = 0xffffffffu;
+  static int at(int x, int y, int z) { return 81 * (x + 1) + 9 * (y + 1) + z + 1; }
+  std::array<std::uint32_t, 729>
+      point_;  ///< of cells −1 to 7 along each axis; valid around crossed edges only
+};
+
+/// The form of each crossed edge, a quad or a fan, and the resulting numbers of vertices and polygons.
+/// Vertices are those of CellBlocks, followed by one for each fanned edge, at its crossing.
 class EdgePolygons {
  public:
-  /// Decides for each edge what it becomes, by the places of the cells' points. Points on fanned edges get
-  /// the numbers from cells.point_count() on. No cell is held yet.
+  /// Decides the form of each edge by the positions of the cells' vertices. No cell is held yet.
   /// @param cells must outlive this
-  /// @param points places of the cells' points, in index space relative to the placement's base
-  /// @param only the crossing edges that have polygons here, all if null; must outlive this
-  /// @param context told of progress, and asked whether to stop
-  /// @throws Error if there are more points or polygons than 32 bits can number; Cancelled.
+  /// @param points positions of the cells' vertices
+  /// @param only the crossed edges that get polygons, all if null; must outlive this
+  /// @param context receives the progress and the request to cancel
+  /// @throws Error for more than 2³² vertices or polygons; Cancelled
   EdgePolygons(const CellBlocks& cells, const UniformPoints& points, const EdgeMasks* only,
                RunContext& context);
 
   const BlockMask& edges(std::int32_t block, int axis) const {
-    const auto b = static_cast<std::size_t>(block), a = static_cast<std::size_t>(axis);
-    return only_ ? (*only_)[b][a] : cells_.source(block).crossing[a];
+    return only_ ? (*only_)[block][axis] : cells_.source(block).crossing[axis];
   }
 
-  /// Whether the cell would have explicit faces of its own if it were held to them.
+  /// Returns true if the cell would have explicit faces if it were held, i.e. constrained to them.
   bool can_be_held(const CellBlocks::Cell& cell) const;
-  /// Whether more than four cells that can be held are among the 27 about this one. There, as nearly
-  /// everywhere in noise, a point finds no room to move.
+  /// Returns true if more than four of the 27 cells around this one can be held. In such a neighbourhood, as
+  /// in most of a noise field, a vertex has no room to move.
   bool is_crowded(const CellBlocks::Cell& cell) const;
-  bool is_held(const CellBlocks::Cell& cell) const {
-    return test(held_[static_cast<std::size_t>(cell.block)], cell.cell);
-  }
-  /// Holds cells to their segments, and decides anew for the edges around them. Throws as the constructor
-  /// does.
+  bool is_held(const CellBlocks::Cell& cell) const { return test(held_[cell.block], cell.cell); }
+  /// Holds cells to their segments, and decides the edges around them again. Throws as the constructor does.
   void hold(const std::vector<CellBlocks::Cell>& cells, const UniformPoints& points, RunContext& context);
   std::vector<CellBlocks::Cell> held_cells() const;
 
-  bool is_centred(const CellBlocks::Cell& cell) const {
-    return test(centred_[static_cast<std::size_t>(cell.block)], cell.cell);
-  }
+  bool is_centred(const CellBlocks::Cell& cell) const { return test(centred_[cell.block], cell.cell); }
   /// Moves the crossings of cells to the middles of their edges (crossing_position()). The edges around all
-  /// cells whose points move with them must then be decided again.
+  /// cells whose vertices move with them must then be decided again.
   void centre(const std::vector<CellBlocks::Cell>& cells);
   std::vector<CellBlocks::Cell> centred_cells() const;
-  /// Decides again for the edges around cells. Throws as the constructor does.
+  /// Decides the edges around cells again. Throws as the constructor does.
   void decide_again(const std::vector<CellBlocks::Cell>& cells, const UniformPoints& points,
                     RunContext& context);
   /// Returns the position of a crossing before rounding: the middle of its edge if any of the four cells is
   /// centred.
   Eigen::Vector3d crossing_position(const CellBlocks::Edge& edge) const;
 
-  std::uint64_t point_count() const { return points_; }  ///< points of cells and points on fanned edges
+  std::uint64_t point_count() const { return points_; }  ///< vertices of cells and of fanned edges
   std::uint64_t fanned_edges() const { return fanned_edges_; }
   std::uint64_t quad_count() const { return quads_; }
   std::uint64_t triangle_count() const { return triangles_; }
-  /// How many quads, and how many triangles, the blocks before this one have.
-  std::uint32_t first_quad(std::int32_t block) const { return of(block).first_quad; }
-  std::uint32_t first_triangle(std::int32_t block) const { return of(block).first_triangle; }
+  /// The number of quads, and of triangles, of the blocks before this one.
+  std::uint32_t first_quad(std::int32_t block) const { return edges_[block].first_quad; }
+  std::uint32_t first_triangle(std::int32_t block) const { return edges_[block].first_triangle; }
 
   bool is_fanned(const CellBlocks::Edge& edge) const {
-    return test(of(edge.block).fanned[edge.axis], edge.sample);
+    return test(fanned(edge.block, edge.axis), edge.sample);
   }
-  const BlockMask& fanned(std::int32_t block, int axis) const { return of(block).fanned[axis]; }
-  /// The number of the point on a fanned edge.
+  const BlockMask& fanned(std::int32_t block, int axis) const { return edges_[block].fanned[axis]; }
+  /// Returns the number of the vertex on a fanned edge.
   std::uint32_t crossing_point(const CellBlocks::Edge& edge) const;
 
   /// Calls quad(Quad) or triangle(Triangle) for the polygons of an edge, counter-clockwise seen from outside
-  /// (at a cut from the edge's second sample). Where two fanned edges share a segment, only the one that
-  /// comes first (CellBlocks::comes_first()) has the two triangles beside it. `near` has the points about the
-  /// edge's block, or is null where they are not at hand.
+  /// (at a cut: from the edge's second sample). If two fanned edges share a segment, the first of them
+  /// (CellBlocks::comes_first()) has the two triangles at it. `near`, if not null, has read the edge's block.
   template <class OnQuad, class OnTriangle>
   void polygons_of(const CellBlocks::Edge& edge, OnQuad&& quad, OnTriangle&& triangle,
                    const PlainPoints* near = nullptr) const {
@@ -90,7 +107,7 @@ class EdgePolygons {
     if (!is_fanned(edge)) {
       std::array<std::uint32_t, 4> p;
       if (!(near ? near->around(edge, p) : cells_.plain_points(edge, p))) p = cells_.around(edge).points;
-      const std::size_t d = test(of(edge.block).second_diagonal[edge.axis], edge.sample);
+      const int d = test(edges_[edge.block].second_diagonal[edge.axis], edge.sample);
       Quad q = {p[d], p[d + 1], p[d + 2], p[(d + 3) % 4]};
       if (!outwards) std::swap(q[1], q[3]);
       quad(q);
@@ -105,13 +122,12 @@ class EdgePolygons {
       const std::uint32_t p = around.points[i], q = around.points[(i + 1) % 4];
       if (!is_explicit(around, i)) {
         add(p, q);
-        continue;
+      } else if (const CellBlocks::Edge other = cells_.other_end(around, i);
+                 cells_.comes_first(edge, other)) {
+        const std::uint32_t y = crossing_point(other);
+        add(p, y);
+        add(y, q);
       }
-      const CellBlocks::Edge other = cells_.other_end(around, i);
-      if (!cells_.comes_first(edge, other)) continue;
-      const std::uint32_t y = crossing_point(other);
-      add(p, y);
-      add(y, q);
     }
   }
 
@@ -125,23 +141,16 @@ class EdgePolygons {
     return cells_.can_be_explicit(around, i) &&
            (is_held(around.cells[i]) || is_held(around.cells[(i + 1) % 4]));
   }
-  const BlockEdges& of(std::int32_t block) const { return edges_[static_cast<std::size_t>(block)]; }
-  BlockEdges& of(std::int32_t block) { return edges_.at(static_cast<std::size_t>(block)); }
   void number_all(RunContext& context);
-  int fan_size(const CellBlocks::Edge& edge, const CellBlocks::Around& around) const;
-  /// Notes what an edge becomes. `hit` is the offset of its crossing, in voxels.
+  /// Decides the form of an edge. `hit` is the offset of its crossing, in voxels.
   void decide(const CellBlocks::Edge& edge, double hit, const UniformPoints& points,
               const PlainPoints* near = nullptr);
-  int safe_diagonal(const CellBlocks::Edge& edge, double hit, const std::array<std::uint32_t, 4>& corners,
-                    const UniformPoints& points) const;
 
   const CellBlocks& cells_;
   const EdgeMasks* const only_;
   ByBlock<BlockEdges> edges_;
-  ByBlock<BlockMask>
-      held_;  ///< held cells; apart from `edges_`, for this is read across blocks while those are made
+  ByBlock<BlockMask> held_, centred_;  ///< cells; not in `edges_`, as they are read across blocks meanwhile
   std::uint64_t points_ = 0, fanned_edges_ = 0, quads_ = 0, triangles_ = 0;
-  ByBlock<BlockMask> centred_;  ///< centred cells
 };
 
 }  // namespace hermesh

@@ -8,22 +8,23 @@ namespace {
 
 using Corner = EnvelopeCorner;
 
-/// What an area whose terms are of the order of one must exceed to be called positive: far above rounding.
+/// Least area, with terms of the order of one, that is certainly positive: far above rounding.
 constexpr double kLeastTurn = 1e-5;
-/// How far heights keep from the ends of the edge, in lengths of the edge.
+/// Distance of heights from the ends of the edge, in lengths of the edge.
 constexpr double kMargin = 1e-4;
 
 double cross(const Corner& a, const Corner& b) { return a.u * b.v - a.v * b.u; }
 
-/// Where the edge passes through the two triangles of diagonal (d, d+2), if both lie in the envelope; the
-/// corners go around it. The diagonal passes the edge on one side, through the half-plane of the corner k
-/// there. If it passes through the triangle of the edge with k, the triangle on that side is within the two
-/// tetrahedra of k; if, besides, the edge passes through the other triangle, that one is within all four.
+/// Returns the height at which the edge intersects the two triangles of diagonal (d, d+2), if both lie in the
+/// envelope; the corners run around the edge. The diagonal passes the edge on one side, through the
+/// half-plane of the corner k there. If it intersects the triangle of the edge and k, the triangle on that
+/// side is within the two tetrahedra of k; if the edge also intersects the other triangle, that one is within
+/// all four.
 std::optional<double> height_if_safe(const std::array<Corner, 4>& r, int d) {
   const Corner &a = r[d], &c = r[d + 2];
   const bool left = cross(a, c) > 0;  // the edge is on the left of the diagonal, and so is corner d+3
   const Corner &beyond = r[left ? d + 1 : (d + 3) % 4], &other = r[left ? (d + 3) % 4 : d + 1];
-  // Where the diagonal meets the half-plane of `beyond`: at `share` of the way to it from the edge.
+  // The diagonal intersects the half-plane of `beyond` at q, `share` of the distance to it from the edge.
   const double from_a = cross(beyond, a), from_c = cross(beyond, c);
   const double t = from_a / (from_a - from_c);
   const Corner q = {a.u + t * (c.u - a.u), a.v + t * (c.v - a.v), a.h + t * (c.h - a.h)};
@@ -40,7 +41,7 @@ std::optional<double> height_if_safe(const std::array<Corner, 4>& r, int d) {
 }  // namespace
 
 EnvelopeCut cut_quad(const std::array<Corner, 4>& r, double hit) {
-  // The corners must go around the edge, each less than half a turn on, or there is no envelope to be in.
+  // Corners that do not run around the edge, each by less than half a turn, have no envelope.
   for (int i = 0; i < 4; ++i)
     if (cross(r[i], r[(i + 1) % 4]) < kLeastTurn) return {.height = hit};
   std::array<std::optional<double>, 2> heights;
@@ -48,8 +49,8 @@ EnvelopeCut cut_quad(const std::array<Corner, 4>& r, double hit) {
   if (!heights[0] && !heights[1]) return {.height = hit};
   const auto cut = [&](int d) { return EnvelopeCut{false, d, *heights[d]}; };
   if (!heights[0] || !heights[1]) return cut(heights[1] ? 1 : 0);
-  // The split must follow a crease. The crossing itself lies on the surface, so the diagonal is right whose
-  // triangles pass nearer to it; where both do, the shorter one makes the better triangles.
+  // Triangles that pass nearer to the crossing, which lies on the surface, follow a crease; among equals, a
+  // shorter diagonal gives better shapes.
   constexpr double kAlike = 1e-4;
   const double off[2] = {std::abs(*heights[0] - hit), std::abs(*heights[1] - hit)};
   if (std::abs(off[0] - off[1]) > kAlike) return cut(off[1] < off[0]);
@@ -63,7 +64,7 @@ EnvelopeCut cut_quad(const std::array<Corner, 4>& r, double hit) {
 EnvelopeCut cut_triangle(const std::array<Corner, 3>& r, double hit) {
   const double wa = cross(r[1], r[2]), wb = cross(r[2], r[0]), wc = cross(r[0], r[1]);
   if (wa < kLeastTurn || wb < kLeastTurn || wc < kLeastTurn) return {.height = hit};
-  // Barycentric weights: the edge stands at the origin of (u, v).
+  // Barycentric weights: the edge is at the origin of (u, v).
   const double height = (wa * r[0].h + wb * r[1].h + wc * r[2].h) / (wa + wb + wc);
   if (!(height > kMargin && height < 1 - kMargin)) return {.height = hit};
   return {false, 0, height};

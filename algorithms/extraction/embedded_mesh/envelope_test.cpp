@@ -3,7 +3,7 @@
 #include <gtest/gtest.h>
 
 namespace hermesh {
-namespace {
+namespace envelope_test {
 
 /// The corners of a quad at these heights, in the middles of the four cells around the edge, in their order.
 std::array<EnvelopeCorner, 4> around(double a, double b, double c, double d) {
@@ -44,5 +44,5 @@ TEST(Envelope, CornersThatDoNotGoAroundTheEdgeAreFanned) {
   EXPECT_TRUE(cut_triangle({{{1, 0, 0.5}, {1, 1, 0.5}, {0, 1, 0.5}}}, 0.5).fanned);
 }
 
-}  // namespace
+}  // namespace envelope_test
 }  // namespace hermesh

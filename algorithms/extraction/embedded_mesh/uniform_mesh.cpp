@@ -10,51 +10,46 @@
 #include "algorithms/core/parallel.h"
 #include "algorithms/extraction/dual_contouring/kernels/leaf_kernels.h"
 #include "algorithms/extraction/dual_contouring/qef.h"
-#include "algorithms/extraction/embedded_mesh/edge_polygons.h"
-#include "algorithms/extraction/embedded_mesh/late_moves.h"
-#include "algorithms/extraction/embedded_mesh/polygon_neighbourhood.h"
-#include "algorithms/extraction/embedded_mesh/sheet_trials.h"
+#include "algorithms/extraction/embedded_mesh/tested_polygons.h"
 
 namespace hermesh {
 namespace {
 
 using Eigen::Vector3d;
 
-/// A point leaves its cell only where the best place within it lies this far off the planes, in voxels and
-/// root mean square: next to a feature that passes outside.
+/// Least deviation of the best position within the cell from the planes for a vertex to leave its cell, in
+/// voxels, root mean square: a feature then passes outside.
 constexpr double kWorthLeavingCell = 0.03;
 
-/// A place within the cell that is as near to the planes as this will do, in voxels and root mean square.
+/// Deviation from the planes up to which a position within the cell is accepted, in voxels, root mean square.
 constexpr double kGoodEnough = 0.005;
 
-/// What a determinant whose terms are of the order of one must exceed to be called positive: far above
-/// rounding.
+/// Least determinant, with terms of the order of one, that is certainly positive: far above rounding.
 constexpr double kLeastVolume = 1e-5;
 
-/// Six times the signed volume of a tetrahedron, voxels cubed.
+/// Returns six times the signed volume of a tetrahedron, voxels cubed.
 double volume(const Vector3d& a, const Vector3d& b, const Vector3d& c, const Vector3d& d) {
   return (b - a).cross(c - a).dot(d - a);
 }
 
-/// The crossings of all edges that a block's cells have, laid out as the vector code wants them
-/// (leaf_kernels::RecordCube). One object serves many blocks, one after another.
+/// The crossings of all edges of a block's cells in the layout of the vector code (leaf_kernels::RecordCube).
+/// One object serves many blocks in turn.
 class CellRecords {
  public:
-  /// Reads the crossings of a block and of the lower layers of those above. False where a normal is none, as
-  /// in data without normals.
+  /// Reads the crossings of a block and of the lower layers of the blocks above. Returns false if a normal is
+  /// not of unit length, as in data without normals.
   bool read(const CellBlocks& cells, std::int32_t block) {
-    // The cube is large and mostly empty: only what the block before has written is cleared.
-    for (const int number : written_) std::fill_n(records_[static_cast<std::size_t>(number)].data(), 4, 0.0f);
+    // The array is large and mostly empty: only entries of the previous block are cleared.
+    for (const int number : written_) std::fill_n(records_[number].data(), 4, 0.0f);
     written_.clear();
     bool all_unit = true;
     cells.grid().crossings(block, own_.data());
     const EdgeCrossing* next = own_.data();
-    // Slot 0 is the block itself. From a block above, its cells have edges that start in the layer next to
-    // it, and none along an axis by which that block lies above: those begin beyond the cells.
+    // Slot 0 is the block itself. In a block above, the cells have edges that start in the adjacent layer,
+    // and none along an axis by which that block lies above.
     for (int slot = 0; slot < 8; ++slot) {
       const int d[3] = {slot & 1, (slot >> 1) & 1, slot >> 2};
-      const std::int32_t there =
-          cells.source(block).neighbours[static_cast<std::size_t>(neighbour_slot(d[0], d[1], d[2]))];
+      const std::int32_t there = cells.source(block).neighbours[neighbour_slot(d[0], d[1], d[2])];
       if (there < 0) continue;
       const std::uint64_t rows = first_layers(d[1], d[2]);
       for (int axis = 0; axis < 3; ++axis) {
@@ -63,14 +58,13 @@ class CellRecords {
           for (std::uint64_t word = cells.source(there).crossing[axis][x] & rows; word != 0;
                word &= word - 1) {
             const int bit = std::countr_zero(word);
-            // The block's own ones come in this very order, by axis and then by sample.
             const EdgeCrossing crossing =
                 slot == 0 ? *next++ : cells.grid().crossing(there, 64 * x + bit, axis);
             const auto& n = crossing.normal;
             const int number = leaf_kernels::RecordCube::number(axis, x + 8 * d[0], (bit >> 3) + 8 * d[1],
                                                                 (bit & 7) + 8 * d[2]);
             written_.push_back(number);
-            records_[static_cast<std::size_t>(number)] = {
+            records_[number] = {
                 static_cast<float>(std::clamp(double(crossing.offset), cells.margin(), 1.0 - cells.margin())),
                 n[axis], n[(axis + 1) % 3], n[(axis + 2) % 3]};
             all_unit = all_unit && n[0] * n[0] + n[1] * n[1] + n[2] * n[2] > 0.5f;
@@ -88,7 +82,7 @@ class CellRecords {
   std::vector<EdgeCrossing> own_ = std::vector<EdgeCrossing>(3 * 512);  ///< the block's
 };
 
-/// Makes the uniform mesh step by step: cells, points, moves by the rule of tetrahedra, polygons, late moves.
+/// The steps of the uniform mesh: cells, vertices, moves by the rule of tetrahedra, polygons, late moves.
 class UniformContourer {
  public:
   UniformContourer(const CellGrid& grid, const DualContouringOptions& options, const FilePoints& file,
@@ -102,8 +96,7 @@ class UniformContourer {
         points_(UniformPoints::of_few(cells_.point_count())) {
     counts_.cells = cells_.cell_count();
     if (grid.cuts().empty()) return;  // no joints
-    for (std::size_t b = 0; b < cells_.size(); ++b)
-      counts_.joints += static_cast<std::uint64_t>(count(cells_[static_cast<std::int32_t>(b)].joints));
+    for (std::size_t b = 0; b < cells_.size(); ++b) counts_.joints += count(cells_[b].joints);
   }
 
   const CellBlocks& cells() const { return cells_; }
@@ -111,32 +104,28 @@ class UniformContourer {
   const UniformCounts& counts() const { return counts_; }
 
   UniformMesh run(RunContext& context) {
-    // The proof of the header speaks of points that lie within their cells or whose tetrahedra stay positive:
-    // those of the first two steps. Polygons are made by these. Late moves keep the polygons and change
-    // places alone.
+    // The argument of the header concerns the vertices of the first two steps, by which the polygons are
+    // made. Late moves change positions only.
     place_all_points(context);
     let_points_leave(context);
     const EdgePolygons polygons = connect(nullptr, context);
     UniformMesh mesh;
     fill(polygons, mesh, context);
-    if (numbers_) number_polygons(polygons, mesh, context);
     move_points(cells_, polygons, targets_, file_, points_, context);
-    // Only points with a target outside can have left.
+    // Only vertices with a target can have left their cells.
     for_each_with_target([&](double outside) { counts_.escaped += outside > 0; });
     mesh.points = points_.take();
     mesh.counts = std::move(counts_);
     return mesh;
   }
 
-  /// Places the points of all active cells, in place of whatever points there are.
+  /// Computes the vertices of all active cells, replacing any previous ones.
   void place_all_points(RunContext& context) {
     points_ = UniformPoints::of_all(cells_.point_count());
-    place_points_of([&](std::size_t b) { return cells_[static_cast<std::int32_t>(b)].active_mask(); },
-                    context);
+    place_points_of([&](std::size_t b) { return cells_[b].active_mask(); }, context);
   }
 
-  /// Places the points of the cells in `wanted`: active ones, a mask per block, whose points are not there
-  /// yet.
+  /// Computes the vertices of the cells in `wanted`, a mask per block of active cells without vertices.
   void place_points(std::span<const BlockMask> wanted, RunContext& context) {
     parallel_blocks(wanted.size(), context, [&](std::size_t b) {
       for_each_bit(wanted[b], [&](int cell) {
@@ -149,21 +138,19 @@ class UniformContourer {
     place_points_of([&](std::size_t b) { return wanted[b]; }, context);
   }
 
-  /// Makes the polygons of `edges`, all crossing ones if null. The points of fanned edges come behind those
-  /// of cells.
+  /// Makes the polygons of `edges`, all crossed ones if null.
   EdgePolygons connect(const EdgeMasks* edges, RunContext& context) {
     EdgePolygons polygons = [&] {
       Stage stage(context, "connect");
       return EdgePolygons(cells_, points_, edges, context);
     }();
-    // A later call is for more edges of the same cells: to hold others than the first time would make other
-    // polygons where there are some already.
+    // A later call adds edges of the same cells; holding others than before would change existing polygons.
     if (held_) {
       polygons.centre(centred_);
       if (!held_->empty()) polygons.hold(*held_, points_, context);
       place_crossings(cells_, polygons, file_, points_, context);
     } else {
-      // How far any point is out of its cell bounds where the polygons near another have their edges.
+      // Bounds the distance of the edges whose polygons may be near another polygon.
       double farthest = 0;
       for_each_with_target([&](double outside) { farthest = std::max(farthest, outside); });
       for (const CellBlocks::Cell& cell :
@@ -178,12 +165,11 @@ class UniformContourer {
   }
 
  private:
-  /// Places the points of the active cells wanted(b) of each block b. There is room for their points.
+  /// Computes the vertices of the active cells wanted(b) of each block b, for which there is room.
   template <class Wanted>
   void place_points_of(Wanted&& wanted, RunContext& context) {
     Stage stage(context, "place points");
     std::vector<std::uint32_t> several(cells_.size());
-    // A block writes the points and targets of its own cells alone; targets end up in the order of cells.
     parallel_blocks(cells_.size(), context, [&](std::size_t b) {
       const auto block = static_cast<std::int32_t>(b);
       const BlockMask asked = wanted(b);
@@ -191,10 +177,6 @@ class UniformContourer {
       const BlockMask placed = place_plain_cells(block, asked);
       for_each_bit(asked, [&](int cell) {
         if (test(placed, cell)) return;
-        if (cells_.is_plain(block, cell)) {
-          points_[cells_.point(block, cell, 0)] = file_.rounded(place_plain(block, cell));
-          return;
-        }
         const int sheets = cells_.point_count(block, cell);
         several[b] += sheets > 1;
         for (int sheet = 0; sheet < sheets; ++sheet)
@@ -204,8 +186,9 @@ class UniformContourer {
     for (const std::uint32_t found : several) counts_.several_sheets += found;
   }
 
-  /// Places most of a block's wanted cells by vector code: plain ones, and in optimal placement only those
-  /// whose planes are nearly parallel. Returns which; all others are left to the code for single cells.
+  /// Computes the vertices of most of a block's wanted cells by vector code: plain ones, and in optimal
+  /// placement only those with nearly parallel planes. Returns the cells placed; the others are left to the
+  /// code for single cells.
   BlockMask place_plain_cells(std::int32_t block, const BlockMask& wanted) {
     BlockMask placed{};
     const bool average = options_.placement == DualContouringOptions::Placement::average;
@@ -223,8 +206,7 @@ class UniformContourer {
       point[found] = cells_.point(block, at, 0);
       cell[found++] = static_cast<std::uint16_t>(at);
     });
-    // The last vector reads on: what it finds there must be cells, and what it makes of them is not looked
-    // at.
+    // The last vector reads beyond the end, where it must find cells; their results are ignored.
     for (std::size_t i = 0; i < leaf_kernels::kLargestVector; ++i) cell[found + i] = 0;
     float* const out[3] = {place[0].data(), place[1].data(), place[2].data()};
     const leaf_kernels::PlainCells plain{records.data(), cell.data(), static_cast<int>(found)};
@@ -232,8 +214,8 @@ class UniformContourer {
       kernels_.place_mean(plain, out);
       is_placed.fill(1);
     } else {
-      // Where points may leave, a cell that is far off its planes goes to best_place(), which notes the
-      // target. Where they may not, any error will do.
+      // If vertices may leave, a cell far off its planes is left to best_place(), which records the target.
+      // Otherwise any error is acceptable.
       kernels_.place_flat(
           plain,
           {.truncation = static_cast<float>(options_.truncation),
@@ -245,43 +227,30 @@ class UniformContourer {
     }
     for (std::size_t i = 0; i < found; ++i) {
       if (!is_placed[i]) continue;
-      placed[static_cast<std::size_t>(cell[i] >> 6)] |= std::uint64_t{1} << (cell[i] & 63);
+      set_bit(placed, cell[i]);
       points_[point[i]] =
           file_.rounded(cells_.corner(block, cell[i]) + Vector3d(place[0][i], place[1][i], place[2][i]));
     }
     return placed;
   }
 
-  /// The place of a plain cell that the vector code has left over: its crossed edges follow from the signs.
-  Vector3d place_plain(std::int32_t block, int cell) {
-    const int signs = cells_.corner_code(cells_.cell_number(block, cell));
-    const Vector3d corner = cells_.corner(block, cell);
-    Qef qef(corner + Vector3d::Constant(0.5));
-    for (unsigned edges = kCrossedEdges[static_cast<std::size_t>(signs)]; edges != 0; edges &= edges - 1) {
-      const CellBlocks::Edge at = cells_.edge_of_cell(block, cell, std::countr_zero(edges));
-      const EdgeCrossing crossing = cells_.grid().crossing(at.block, at.sample, at.axis);
-      const auto& n = crossing.normal;
-      qef.add_plane(cells_.crossing_point(at, crossing), Vector3d(n[0], n[1], n[2]));
-    }
-    if (options_.placement == DualContouringOptions::Placement::average) return qef.mass_point();
-    return best_place(block, cell, qef, corner);
-  }
-
-  /// The place of a sheet's point, within the cell, and noted if it would be better off outside. With several
-  /// sheets it is the mean of the loop's crossings: in their hull, which no other loop's hull meets
-  /// (cell_sheets.h).
+  /// Returns the position of a sheet's vertex within the cell, and records a better one outside. With several
+  /// sheets it is the mean of the loop's crossings: in their hull, which is disjoint from those of other
+  /// loops (cell_sheets.h).
   Vector3d place(std::int32_t block, int cell, int sheet, int sheets) {
+    const bool plain = cells_.is_plain(block, cell);
     const CellSheets& loops = cells_.sheets(block, cell);
     const Vector3d corner = cells_.corner(block, cell);
     Qef qef(corner + Vector3d::Constant(0.5));
     Vector3d sum = Vector3d::Zero();
     int crossings = 0;
-    for (int edge = 0; edge < 12; ++edge) {
+    // A joint of one vertex has all crossed edges of its cell, including cuts, which sheet_of ignores.
+    for (unsigned edges = plain ? kCrossedEdges[cells_.corner_code(cells_.cell_number(block, cell))] : 0xfffu;
+         edges != 0; edges &= edges - 1) {
+      const int edge = std::countr_zero(edges);
       if (sheets > 1 && loops.sheet_of[edge] != sheet) continue;
       const CellBlocks::Edge at = cells_.edge_of_cell(block, cell, edge);
-      // A joint of one point has all crossing edges of its cell, its cuts included, of which sheet_of does
-      // not tell.
-      if (sheets == 1 && !cells_.is_crossed(at)) continue;
+      if (sheets == 1 && !plain && !cells_.is_crossed(at)) continue;
       const EdgeCrossing crossing = cells_.grid().crossing(at.block, at.sample, at.axis);
       const Vector3d point = cells_.crossing_point(at, crossing);
       const auto& n = crossing.normal;
@@ -289,23 +258,25 @@ class UniformContourer {
       sum += point;
       ++crossings;
     }
-    if (sheets > 1 || options_.placement == DualContouringOptions::Placement::average) return sum / crossings;
+    if (sheets > 1) return sum / crossings;
+    if (options_.placement == DualContouringOptions::Placement::average)
+      return plain ? qef.mass_point() : Vector3d(sum / crossings);
     return best_place(block, cell, qef, corner);
   }
 
-  /// The place within the cell, margin() off its faces, with the least error, drawn back on smooth surfaces.
-  /// If even that is far from the planes, as beside a sharp feature that passes outside, or if these meet
-  /// elsewhere, the free minimiser is aimed at.
+  /// Returns the position within the cell, margin() off its faces, with the least error, drawn back on smooth
+  /// surfaces. If even that is far from the planes, as near a sharp feature that passes outside, or if these
+  /// intersect elsewhere, the unconstrained minimiser is recorded as a target.
   Vector3d best_place(std::int32_t block, int cell, const Qef& qef, const Vector3d& corner) {
     const Vector3d margin = Vector3d::Constant(cells_.margin());
     const Vector3d lower = corner + margin, upper = corner + Vector3d::Ones() - margin;
     const Vector3d free = qef.minimiser(options_.truncation),
                    mass = qef.mass_point().cwiseMax(lower).cwiseMin(upper);
     const double share = qef.share_of_minimiser(options_.smooth_share(), options_.truncation);
-    // To clamp the minimiser is cheap, and mostly good enough; the search over faces, edges and corners is
-    // not.
+    // Clamping the minimiser is cheap and usually sufficient, unlike the search over faces, edges and
+    // corners.
     const Vector3d nearest = free.cwiseMax(lower).cwiseMin(upper);
-    // From a level set planes never meet exactly, and whether they nearly do is chance.
+    // Planes from a level set never intersect exactly in one point, and nearly do so only by chance.
     const bool meet = reach_ > 0 && !options_.linear_crossings && qef.planes_meet(free, nearest);
     if (!meet && qef.error(nearest) <= kGoodEnough * kGoodEnough * qef.planes())
       return mass + share * (nearest - mass);
@@ -315,16 +286,16 @@ class UniformContourer {
       const auto is_near = [&](const Vector3d& p) {
         return (p - corner - Vector3d::Constant(0.5)).cwiseAbs().maxCoeff() <= 0.5 + reach_;
       };
-      // Where minima form a line or a plane, the one next to the place in the cell needs the shorter move.
+      // If the minima form a line or a plane, the one nearest to the position in the cell needs the shortest
+      // move.
       const Vector3d nearer = qef.minimiser_near(held, options_.truncation);
       if (is_near(free)) targets_[block].push_back({cell, free, is_near(nearer) ? nearer : free});
     }
     return mass + share * (held - mass);
   }
 
-  /// Lets points leave their cells by the rule of tetrahedra. Cells of one parity share no face, so their
-  /// points move independently of one another: eight rounds, with the same result whatever the order within
-  /// each.
+  /// Lets vertices leave their cells by the rule of tetrahedra. Cells of one parity share no face, so their
+  /// vertices move independently: eight rounds, each with a result that does not depend on the order.
   void let_points_leave(RunContext& context) {
     Stage stage(context, "let points leave");
     for (int parity = 0; parity < 8; ++parity)
@@ -336,8 +307,8 @@ class UniformContourer {
       });
   }
 
-  /// Calls f(how far the point is out of its cell along an axis, negative inside) for all that would rather
-  /// be outside.
+  /// Calls f(distance) for all vertices with a target: how far it is out of its cell along an axis, negative
+  /// inside.
   template <class F>
   void for_each_with_target(F&& f) const {
     for (std::size_t b = 0; b < cells_.size(); ++b)
@@ -349,8 +320,8 @@ class UniformContourer {
       }
   }
 
-  /// Moves the point of one cell as far towards its target as its 24 tetrahedra stay positive. Cells with
-  /// explicit faces, and those beside such, keep to their cells: the cones over their segments need it
+  /// Moves the vertex of one cell as far towards its target as its 24 tetrahedra remain positive. Cells with
+  /// explicit faces, and those next to them, do not move: the cones over their segments require it
   /// (uniform_mesh.h).
   void leave(std::int32_t block, const PointTarget& target) {
     if (cells_.has_explicit_face(block, target.cell)) return;
@@ -366,7 +337,7 @@ class UniformContourer {
     for (int edge = 0; edge < 12; ++edge)
       crossed |= unsigned(cells_.is_crossed(cells_.edge_of_cell(block, target.cell, edge))) << edge;
     for (const double share : {1.0, 0.75, 0.5, 0.25}) {
-      // Tested as the file will hold it. Shares of the way, because the target may be just out of reach.
+      // Fractions of the distance, because the target may be just out of reach.
       const Vector3d candidate = file_.rounded(point + share * (target.place - point));
       if (!tetrahedra_are_positive(corner, candidate, beside, crossed, cells_.rounding())) continue;
       point = candidate;
@@ -374,8 +345,8 @@ class UniformContourer {
     }
   }
 
-  /// The point of the cell beyond a face, the middle of one that the surface does not pass through (no
-  /// polygon uses it, but the tetrahedra do), or none if that cell has an explicit face.
+  /// Returns the vertex of the cell beyond a face, the centre of an inactive one (which no polygon uses, but
+  /// the tetrahedra do), or nothing if that cell has an explicit face.
   std::optional<Vector3d> point_beside(std::int32_t block, int cell, int face) const {
     int at[3] = {cell >> 6, (cell >> 3) & 7, cell & 7};
     const int step = face & 1 ? 1 : -1;
@@ -390,9 +361,9 @@ class UniformContourer {
     return points_[cells_.point(there.block, there.cell, 0)];
   }
 
-  /// Whether all tetrahedra of a lattice edge of the cell, its point and that of a cell beside it are
-  /// positively oriented, and those of crossed edges stay so if a point up to `aside` from the edge's middle
-  /// cuts them in two.
+  /// Returns true if all tetrahedra of a lattice edge of the cell, its vertex and that of an adjacent cell
+  /// are positively oriented, and those of crossed edges remain so if divided by a point up to `aside` from
+  /// the middle of the edge.
   static bool tetrahedra_are_positive(const Vector3d& corner, const Vector3d& point,
                                       const std::array<Vector3d, 6>& beside, unsigned crossed,
                                       const Vector3d& aside) {
@@ -406,7 +377,7 @@ class UniformContourer {
         // Corners run counter-clockwise for a viewer whom the face's axis points at.
         const double v = volume(at(corners[i]), at(corners[(i + 1) % 4]), point, beside[face]);
         if ((face & 1 ? v : -v) < kLeastVolume) return false;
-        // Either part has half of the volume, of which the move leaves a tenth at least (fan_point()).
+        // Either part has half of the volume, of which the offset leaves at least a tenth (fan_point()).
         if (!(crossed >> edges[i] & 1)) continue;
         for (const int end : {i, (i + 1) % 4}) {
           const Vector3d to_point = point - at(corners[end]), to_beside = beside[face] - at(corners[end]);
@@ -417,42 +388,38 @@ class UniformContourer {
     return true;
   }
 
-  /// Writes the polygons of each block to where EdgePolygons has counted them to be.
+  /// Writes the polygons of each block to the positions counted by EdgePolygons, and the numbers of their
+  /// edges if requested.
   void fill(const EdgePolygons& polygons, UniformMesh& mesh, RunContext& context) const {
     Stage stage(context, "connect");
     mesh.quads.resize(polygons.quad_count());
     mesh.triangles.resize(polygons.triangle_count());
+    std::vector<std::uint64_t> first(cells_.size());  // number of each block's first edge
+    if (numbers_) {
+      for (std::size_t b = 0; b < cells_.size(); ++b)
+        for (const BlockMask& edges : cells_.source(b).crossing) first[b] += count(edges);
+      exclusive_scan(first, "edge crossings");
+      numbers_->quads.resize(mesh.quads.size());
+      numbers_->triangles.resize(mesh.triangles.size());
+    }
     parallel_blocks(cells_.size(), context, [&](std::size_t b) {
       const auto block = static_cast<std::int32_t>(b);
-      Quad* quad = mesh.quads.data() + polygons.first_quad(block);
-      Triangle* triangle = mesh.triangles.data() + polygons.first_triangle(block);
+      std::uint32_t quad = polygons.first_quad(block), triangle = polygons.first_triangle(block);
+      auto number = static_cast<std::uint32_t>(first[b]);
       PlainPoints near;
       near.read(cells_, block);
       cells_.for_each_crossing_edge(block, [&](const CellBlocks::Edge& edge) {
         polygons.polygons_of(
-            edge, [&](const Quad& q) { *quad++ = q; }, [&](const Triangle& t) { *triangle++ = t; }, &near);
-      });
-    });
-  }
-
-  /// Writes the number of each polygon's edge. Blocks count their crossing edges in the order in which fill()
-  /// makes the polygons.
-  void number_polygons(const EdgePolygons& polygons, const UniformMesh& mesh, RunContext& context) {
-    std::vector<std::uint64_t> first(cells_.size());
-    for (std::size_t b = 0; b < cells_.size(); ++b)
-      for (const BlockMask& edges : cells_.grid().blocks()[b].crossing)
-        first[b] += static_cast<std::uint64_t>(count(edges));
-    exclusive_scan(first, "edge crossings");
-    numbers_->quads.resize(mesh.quads.size());
-    numbers_->triangles.resize(mesh.triangles.size());
-    parallel_blocks(cells_.size(), context, [&](std::size_t b) {
-      const auto block = static_cast<std::int32_t>(b);
-      auto number = static_cast<std::uint32_t>(first[b]);
-      std::uint32_t* quad = numbers_->quads.data() + polygons.first_quad(block);
-      std::uint32_t* triangle = numbers_->triangles.data() + polygons.first_triangle(block);
-      cells_.for_each_crossing_edge(block, [&](const CellBlocks::Edge& edge) {
-        polygons.polygons_of(
-            edge, [&](const Quad&) { *quad++ = number; }, [&](const Triangle&) { *triangle++ = number; });
+            edge,
+            [&](const Quad& q) {
+              if (numbers_) numbers_->quads[quad] = number;
+              mesh.quads[quad++] = q;
+            },
+            [&](const Triangle& t) {
+              if (numbers_) numbers_->triangles[triangle] = number;
+              mesh.triangles[triangle++] = t;
+            },
+            &near);
         ++number;
       });
     });
@@ -461,14 +428,14 @@ class UniformContourer {
   PolygonEdges* const numbers_;
   CellBlocks cells_;
   const DualContouringOptions options_;
-  const double reach_;  ///< how far points may be from their cells, voxels
+  const double reach_;  ///< largest distance of vertices from their cells, voxels
   const FilePoints& file_;
   const leaf_kernels::Kernels& kernels_ = chosen_kernels<leaf_kernels::Kernels>();
   std::vector<std::vector<PointTarget>> targets_;  ///< one list per block, ascending by cell
   UniformPoints points_;
   UniformCounts counts_;
-  /// The cells held, found when polygons are made first: all edges that the answer depends on are among those
-  /// asked for then, and ever after.
+  /// The cells held, as found by the first connect(): the edges that they depend on are part of every
+  /// request.
   std::optional<std::vector<CellBlocks::Cell>> held_;
   std::vector<CellBlocks::Cell> centred_;  ///< likewise
 };
@@ -505,7 +472,7 @@ struct UniformCells::Made {
   // Before the contourer, which refers to it.
   const HermiteCells grid;
   UniformContourer contourer;
-  LargeArray<BlockMask> placed;  ///< cells of each block whose points are there
+  LargeArray<BlockMask> placed;  ///< cells of each block with vertices
 };
 
 UniformCells::UniformCells(const HermiteView& grid, const DualContouringOptions& options,
@@ -518,7 +485,7 @@ const UniformPoints& UniformCells::points() const { return made_->contourer.poin
 const UniformCounts& UniformCells::counts() const { return made_->contourer.counts(); }
 
 void UniformCells::place(std::span<const BlockMask> wanted, RunContext& context) {
-  // What is there already stays where it is: places that polygons were made by must not change.
+  // Vertices that polygons were made from must not move.
   LargeArray<BlockMask> missing(wanted.size());
   parallel_blocks(missing.size(), context, [&](std::size_t b) {
     for (std::size_t word = 0; word < missing[b].size(); ++word) {
@@ -530,8 +497,7 @@ void UniformCells::place(std::span<const BlockMask> wanted, RunContext& context)
 }
 
 void UniformCells::place_all(RunContext& context) {
-  for (std::size_t b = 0; b < made_->placed.size(); ++b)
-    made_->placed[b] = cells()[static_cast<std::int32_t>(b)].active_mask();
+  for (std::size_t b = 0; b < made_->placed.size(); ++b) made_->placed[b] = cells()[b].active_mask();
   made_->contourer.place_all_points(context);
 }
 

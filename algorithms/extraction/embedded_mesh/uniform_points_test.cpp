@@ -4,10 +4,10 @@
 
 #include <set>
 
-#include "algorithms/extraction/embedded_mesh/by_block.h"
+#include "algorithms/extraction/embedded_mesh/cell_blocks.h"
 
 namespace hermesh {
-namespace {
+namespace uniform_points_test {
 
 using Eigen::Vector3d;
 
@@ -63,5 +63,5 @@ TEST(ByBlock, ReadsAnEmptyOneWhereThereIsNone) {
   EXPECT_TRUE(lists[1].empty());
 }
 
-}  // namespace
+}  // namespace uniform_points_test
 }  // namespace hermesh

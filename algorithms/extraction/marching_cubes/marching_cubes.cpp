@@ -6,23 +6,23 @@
 #include "algorithms/core/parallel.h"
 #include "algorithms/extraction/hermite_input.h"
 #include "algorithms/extraction/marching_cubes/triangulation_table.h"
-#include "algorithms/hermite/representation.h"
 #include "algorithms/hermite/samplers.h"
 #include "algorithms/lattice/crossing_edges.h"
 #include "algorithms/lattice/grid_placement.h"
 #include "algorithms/lattice/leaf_table.h"
+#include "algorithms/thesis/voxels/representation.h"
 
 namespace hermesh {
 namespace {
 
-/// What one leaf adds to the mesh, and where in it.
+/// The vertices and triangles of one leaf, and their positions in the mesh.
 struct LeafOutput : CrossingEdges {
   std::uint32_t first_point, first_triangle;
 
   std::uint32_t point_on(int axis, int sample) const { return first_point + rank(axis, sample); }
 };
 
-/// The leaves, and cells and samples beyond them.
+/// The leaves, and the cells and samples beyond them.
 class Leaves {
  public:
   Leaves(const LevelSet& level_set, double isovalue, RunContext& context)
@@ -33,9 +33,9 @@ class Leaves {
   const LeafTable& table() const { return table_; }
 
   /// Calls f(x, y, z, pattern) for each active cell that the leaf owns, with its first corner relative to the
-  /// leaf. A leaf owns the cells that start in it. The surface may also pass through cells that start beside
-  /// the leaves and reach into one; of all leaves that the block of such cells touches above, the first in
-  /// the order of is_first_above() owns them.
+  /// leaf. A leaf owns the cells that start in it. The surface may also pass through cells that start outside
+  /// the leaves and extend into one. These cells are grouped by the block in which they start; of all leaves
+  /// that such cells of a block touch above it, the first in the order of is_first_above() owns them.
   template <class F>
   void for_each_active_cell(std::size_t leaf, F&& f) const {
     for_each_active_cell_of_block(leaf, {0, 0, 0}, f);
@@ -46,19 +46,19 @@ class Leaves {
     }
   }
 
-  /// The sample at (x, y, z) from a leaf's first, each 0 to 8; negative inside, in units of the volume's
-  /// values.
+  /// Returns the sample at (x, y, z) from a leaf's first, each 0 to 8; negative inside, in units of the
+  /// volume's values.
   double signed_value(std::size_t leaf, int x, int y, int z) const {
     const std::int32_t there = table_.neighbour(leaf, x >> 3, y >> 3, z >> 3);
-    // An edge that ends in a tile is rare, so that a search through the tree is no matter.
+    // An edge that ends in a tile is rare, so a search through the tree is fast enough.
     const float value =
         there < 0 ? table_.value_at(leaf, x, y, z) : table_.values(there)[sample_index(x & 7, y & 7, z & 7)];
     return double(table_.rule().scale) * (double(value) - isovalue_);
   }
 
  private:
-  /// Signs of the eight corners of the cells that start in the block at `offset` (in blocks, each 0 or −1)
-  /// from a leaf.
+  /// Returns the signs of the eight corners of the cells that start in the block at `offset` (in blocks, each
+  /// 0 or −1) from a leaf.
   std::array<BlockMask, 8> corner_signs(std::size_t leaf, const std::array<int, 3>& offset) const {
     std::array<BlockMask, 8> corner;
     for (int c = 0; c < 8; ++c)
@@ -70,7 +70,7 @@ class Leaves {
     return corner;
   }
 
-  /// Whether `leaf` comes first among the leaves in the blocks above the block at `offset`.
+  /// Returns true if `leaf` is the first of the leaves in the blocks above the block at `offset`.
   bool is_first_above(std::size_t leaf, const std::array<int, 3>& offset) const {
     for (int above = 1; above < 8; ++above) {
       const int dx = offset[0] + (above & 1), dy = offset[1] + (above >> 1 & 1),
@@ -104,8 +104,9 @@ class Leaves {
   const double isovalue_;
 };
 
-/// Where the surface meets an edge of a leaf, 0 to 1 along it: by linear interpolation of the samples, or,
-/// where there are crossings, theirs, which are in the order of the edges.
+/// Writes the intersection of the surface with each crossed edge of a leaf, 0 to 1 along the edge: by linear
+/// interpolation of the samples, or from the crossings, if there are any, which are in the order of the
+/// edges.
 void write_points(const Leaves& leaves, std::size_t leaf, const FloatHermite* hermite,
                   const LeafOutput& output, PolygonMesh& mesh) {
   const IndexToWorld& placement = leaves.placement();
@@ -119,8 +120,8 @@ void write_points(const Leaves& leaves, std::size_t leaf, const FloatHermite* he
         leaves.signed_value(leaf, local[0] + (axis == 0), local[1] + (axis == 1), local[2] + (axis == 2));
     Eigen::Vector3d position;
     for (int a = 0; a < 3; ++a) position[a] = lower[a] - placement.base[a] + local[a];
-    // Differences of signed values at both ends cannot be 0, for the signs differ. Held off
-    // the ends, no two points meet.
+    // Differences of signed values at both ends cannot be 0, because the signs differ. A margin at the ends
+    // prevents vertices from coinciding.
     const double offset = crossing ? double((crossing++)->offset) : from / (from - to);
     position[axis] += std::clamp(offset, kCrossingMargin, 1.0 - kCrossingMargin);
     mesh.points[output.point_on(axis, sample)] = placement.local(position).cast<float>();
@@ -130,24 +131,24 @@ void write_points(const Leaves& leaves, std::size_t leaf, const FloatHermite* he
 void write_triangles(const Leaves& leaves, std::size_t leaf, const std::vector<LeafOutput>& outputs,
                      PolygonMesh& mesh) {
   const bool mirrors = leaves.placement().mirrors();
-  // Points of neighbouring leaves are known by number alone, from their ranks, whether or not they are
-  // written yet.
+  // Vertices of neighbouring leaves are identified only by index, from their ranks, and need not be written
+  // yet.
   Triangle* next = mesh.triangles.data() + outputs[leaf].first_triangle;
   leaves.for_each_active_cell(leaf, [&](int x, int y, int z, int pattern) {
     const CellTriangles& cell = kTriangulation[pattern];
     for (int t = 0; t < cell.count; ++t, ++next)
       for (int corner = 0; corner < 3; ++corner) {
         const CellEdge edge = kCellEdges[cell.triangles[t][mirrors ? 2 - corner : corner]];
-        // An edge that changes sign starts in a leaf, as the table promises.
+        // An edge that changes sign starts in a leaf, as the table guarantees.
         const LatticePlace at =
             leaves.table().locate(leaf, x + (edge.first_corner & 1), y + ((edge.first_corner >> 1) & 1),
                                   z + (edge.first_corner >> 2));
-        (*next)[corner] = outputs[static_cast<std::size_t>(at.block)].point_on(edge.axis, at.sample);
+        (*next)[corner] = outputs[at.block].point_on(edge.axis, at.sample);
       }
   });
 }
 
-/// Exact crossings through the representation that needs no more than offsets (§2.7), or none if the samples
+/// Returns exact crossings from the representation that stores only offsets (§2.7), or none if the samples
 /// are to be interpolated.
 std::optional<FloatHermite> directed_distances(const ExtractionInput& input) {
   if (input.options.text("crossings") == "samples") return std::nullopt;
@@ -170,8 +171,8 @@ PolygonMesh marching_cubes(const LevelSet& level_set, double isovalue, const Flo
     Stage stage(context, "read signs");
     return Leaves(level_set, isovalue, context);
   }();
-  // Count, scan, fill (core/parallel.h): a leaf writes its own entry, then its own range of points and
-  // triangles. The order of the mesh is that of the leaves, whatever the threads do.
+  // Count, scan, fill (core/parallel.h): a leaf writes its own entry, then its own range of vertices and
+  // triangles. The order of the mesh is that of the leaves, for any thread schedule.
   std::vector<LeafOutput> outputs(leaves.size());
   std::vector<std::uint64_t> points(leaves.size()), triangles(leaves.size());
   {
@@ -189,8 +190,8 @@ PolygonMesh marching_cubes(const LevelSet& level_set, double isovalue, const Flo
   mesh.origin = leaves.placement().origin;
   mesh.points.resize(exclusive_scan(points, "points"));
   mesh.triangles.resize(exclusive_scan(triangles, "triangles"));
-  // From here on point_on() gives numbers of the mesh. The fill reads the outputs of other leaves and changes
-  // none.
+  // From here on point_on() returns indices of the mesh. The fill reads the outputs of other leaves and does
+  // not change any.
   for (std::size_t leaf = 0; leaf < leaves.size(); ++leaf) {
     outputs[leaf].first_point = static_cast<std::uint32_t>(points[leaf]);
     outputs[leaf].first_triangle = static_cast<std::uint32_t>(triangles[leaf]);

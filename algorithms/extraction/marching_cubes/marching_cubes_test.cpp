@@ -10,7 +10,7 @@
 #include "algorithms/voxelization/voxelize_for_tests.h"
 
 namespace hermesh {
-namespace {
+namespace marching_cubes_test {
 
 using openvdb::Coord;
 
@@ -21,7 +21,7 @@ openvdb::FloatGrid::Ptr outside_grid() {
   return grid;
 }
 
-/// Whether each edge of a triangle is met by another triangle the other way round.
+/// Returns true if each edge of a triangle also belongs to another triangle, in the opposite direction.
 bool is_closed(const PolygonMesh& mesh) {
   std::map<std::pair<std::uint32_t, std::uint32_t>, int> sum;
   for (const Triangle& t : mesh.triangles)
@@ -32,7 +32,7 @@ bool is_closed(const PolygonMesh& mesh) {
   return std::ranges::all_of(sum, [](const auto& edge) { return edge.second == 0; });
 }
 
-/// The number of points, one for each edge that changes sign, of a mesh that must be closed.
+/// Returns the number of vertices, one for each edge that changes sign, of a mesh that must be closed.
 std::size_t points(const openvdb::FloatGrid::Ptr& grid, double isovalue) {
   RunContext context;
   const PolygonMesh mesh = marching_cubes(make_level_set(grid), isovalue, nullptr, context);
@@ -50,7 +50,7 @@ TEST(MarchingCubes, OneInsideVoxelHasSixCrossingEdgesWhereverItLies) {
 }
 
 TEST(MarchingCubes, ATileOfTheOtherSignIsWalledIn) {
-  // An inside tile of 8³ alone in the background, where the tree has no leaf at all: 6 faces of 64 edges
+  // A single inside tile of 8³ in the background, where the tree has no leaf at all: 6 faces of 64 edges
   // each.
   auto grid = outside_grid();
   grid->tree().addTile(1, Coord(16, 16, 16), -1.0f, true);
@@ -64,7 +64,7 @@ TEST(MarchingCubes, ATileOfTheOtherSignIsWalledIn) {
 TEST(MarchingCubes, AnActiveVoxelBesideATileOfTheOtherSign) {
   auto grid = outside_grid();
   grid->tree().addTile(1, Coord(0, 0, 0), -1.0f, true);
-  grid->tree().setValue(Coord(8, 3, 3), 0.5f);  // its leaf replaces nothing: the tile keeps its place
+  grid->tree().setValue(Coord(8, 3, 3), 0.5f);  // its leaf does not replace the tile
   EXPECT_EQ(points(grid, 0.0), 6u * 64u);
 }
 
@@ -125,7 +125,7 @@ TEST(MarchingCubes, DenseFogIsInside) {
   EXPECT_EQ(points(grid, 0.5), 6u);
 }
 
-/// Cells that start where no leaf is, at all sides, edges and corners of leaves: each belongs to one leaf.
+/// Cells that start outside the leaves, at all sides, edges and corners of leaves: each belongs to one leaf.
 TEST(MarchingCubes, CellsBelowLeavesAreMadeOnce) {
   std::mt19937 random(5);
   for (int round = 0; round < 20; ++round) {
@@ -146,5 +146,5 @@ TEST(MarchingCubes, CellsBelowLeavesAreMadeOnce) {
   }
 }
 
-}  // namespace
+}  // namespace marching_cubes_test
 }  // namespace hermesh

@@ -28,16 +28,16 @@ constexpr bool on_common_face(int a, int b) {
   return false;
 }
 
-/// For each crossing edge the next one on its loop, −1 elsewhere. On each face a segment runs from the edge
-/// where the walk about the face enters the inside to the edge where it leaves it again: that cuts off the
-/// inside corners.
+/// For each crossed edge the next one on its loop, −1 elsewhere. On each face a segment runs from the edge
+/// through which the walk around the face enters the inside to the edge through which it leaves it again,
+/// which cuts off the inside corners.
 constexpr std::array<int, 12> segments(int pattern) {
   std::array<int, 12> next{};
   next.fill(-1);
   for (const auto& face : kFaces)
     for (int i = 0; i < 4; ++i) {
       const auto inside = [&](int k) { return ((pattern >> face[k & 3]) & 1) != 0; };
-      // On an ambiguous face there are two such places, and each run of inside corners is one.
+      // An ambiguous face has two such edges, one for each run of inside corners.
       if (inside(i) || !inside(i + 1)) continue;
       int leave = i + 1;
       while (inside(leave + 1)) ++leave;
@@ -56,12 +56,12 @@ constexpr bool diagonal_allowed(const Loop& loop, int i, int j) {
   return apart == 1 || apart == loop.size - 1 || !on_common_face(loop.edges[i], loop.edges[j]);
 }
 
-/// Cuts the part of the loop from i to j into triangles, without the side from j to i; false if no way is
-/// allowed.
+/// Cuts the part of the loop from i to j into triangles, without the side from j to i; false if no
+/// triangulation is allowed.
 constexpr bool triangulate(const Loop& loop, int i, int j, CellTriangles& result) {
   if (j - i < 2) return true;
-  // The side from i to j belongs to one triangle, with its third corner k between: all k are
-  // tried, and both rests in turn.
+  // The side from i to j belongs to one triangle, with its third corner k between: all k are tried, and both
+  // remaining parts recursively.
   for (int k = i + 1; k < j; ++k) {
     if (!diagonal_allowed(loop, i, k) || !diagonal_allowed(loop, k, j)) continue;
     const int before = result.count;
@@ -78,9 +78,8 @@ constexpr CellTriangles triangulate_pattern(int pattern) {
   CellTriangles result;
   const std::array<int, 12> next = segments(pattern);
   std::array<bool, 12> done{};
-  // Two faces share an edge and walk along it in opposite directions, so that it is entered on one and left
-  // on the other: each crossing edge has one successor and one predecessor, and the segments form closed
-  // loops.
+  // Two faces share an edge and traverse it in opposite directions, so that it is entered on one and left on
+  // the other: each crossed edge has one successor and one predecessor, and the segments form closed loops.
   for (int start = 0; start < 12; ++start) {
     if (next[start] < 0 || done[start]) continue;
     Loop loop;
@@ -101,7 +100,7 @@ constexpr std::array<CellTriangles, 256> build() {
 
 }  // namespace
 
-// A pattern without an allowed triangulation would stop the compilation here.
+// A pattern without an allowed triangulation would fail to compile here.
 constexpr std::array<CellTriangles, 256> kTriangulation = build();
 
 bool share_a_face(int edge_a, int edge_b) { return on_common_face(edge_a, edge_b); }

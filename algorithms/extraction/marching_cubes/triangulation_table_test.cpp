@@ -6,7 +6,7 @@
 #include <set>
 
 namespace hermesh {
-namespace {
+namespace triangulation_table_test {
 
 bool crosses(int pattern, const CellEdge& edge) {
   const int other = edge.first_corner | (1 << edge.axis);
@@ -22,7 +22,7 @@ TEST(TriangulationTable, KnownCells) {
 }
 
 TEST(TriangulationTable, ACutOffCornerFacesAwayFromIt) {
-  // Corner 0 inside: the normal of the triangle over the edges' middles points along (1,1,1),
+  // Corner 0 inside: the normal of the triangle between the edges' midpoints points along (1,1,1),
   // counter-clockwise.
   const auto& triangle = kTriangulation[1].triangles[0];
   const auto axis_after = [](int edge) { return (kCellEdges[edge].axis + 1) % 3; };
@@ -39,8 +39,8 @@ TEST(TriangulationTable, UsesEveryCrossingEdgeAndNoOther) {
   }
 }
 
-/// Within a cell: a side between edges without a common face is a diagonal and belongs to two triangles, once
-/// in each direction; a side between edges of one face is open, and its neighbour cell closes it.
+/// Within a cell, a side between edges without a common face is a diagonal and belongs to two triangles, once
+/// in each direction; a side between edges of one face is open, and the adjacent cell closes it.
 TEST(TriangulationTable, DiagonalsArePairedAndNeverLieOnAFace) {
   for (int pattern = 0; pattern < 256; ++pattern) {
     std::map<std::pair<int, int>, int> sides;
@@ -55,5 +55,5 @@ TEST(TriangulationTable, DiagonalsArePairedAndNeverLieOnAFace) {
   }
 }
 
-}  // namespace
+}  // namespace triangulation_table_test
 }  // namespace hermesh

@@ -1,9 +1,9 @@
-// Every operation is elementwise and rounded once, so all levels give the same bytes.
+// Every operation is elementwise and rounded once, so all SIMD levels give the same bytes.
 #include "algorithms/hermite/edge_kernels/edge_kernels.h"
 
-#include "algorithms/hermite/with_normal_code.h"
+#include "algorithms/hermite/normal_codes.h"
 
-// These have the edges of many leaves in one loop, enough for vectors of sixteen.
+// The edges of many leaves are in one loop, enough for vectors of sixteen.
 #define HERMESH_WIDEST_VECTORS
 #include "algorithms/lattice/simd/bits.h"
 #include "algorithms/lattice/simd/vectors.h"

@@ -1,6 +1,6 @@
-// The Hermite data of 8³ leaves of a scalar volume, compiled for several levels of vector code; all give the
-// same bytes. Light and free of the standard library's functions, because what two levels share the linker
-// may take from either. Bits are in the order of BlockMask, word x, bit 8y+z.
+// The Hermite data of 8³ leaves of a scalar volume, compiled for several SIMD levels; all give the same
+// bytes. Lightweight and free of standard library functions, because the linker may take code that two levels
+// share from either. Bits are in the order of BlockMask, word x, bit 8y+z.
 #pragma once
 
 #include <cstdint>
@@ -11,7 +11,7 @@
 namespace hermesh::edge_kernels {
 
 /// Interface of the plain code for edges whose stencils have samples that are no data, or differences whose
-/// squares single precision has no room for, which the vector code leaves out.
+/// squares exceed single precision, which the vector code leaves out.
 class PlainCrossing {
  public:
   /// Computes the crossing of an edge along `axis` that starts in the leaf or a step beyond; `record` gets
@@ -22,13 +22,13 @@ class PlainCrossing {
   ~PlainCrossing() = default;
 };
 
-/// The samples that a leaf's crossings are made from.
+/// The samples for a leaf's crossings.
 struct LeafInput {
-  /// Samples of the leaf and its neighbours by neighbour_slot(), 512 each; where there is no leaf all must be
+  /// Samples of the leaf and its neighbours by neighbour_slot(), 512 each; without a leaf all must be
   /// infinite.
   const float* values[27];
-  /// Stencils with samples of no less than data_below in magnitude are left to `incomplete`; where active[13]
-  /// is not null, so are those with samples without a bit there.
+  /// Stencils with samples of at least data_below in magnitude are left to `incomplete`; if active[13] is not
+  /// null, so are those with samples without a bit there.
   const std::uint64_t* active[27];
   float data_below;
   float isovalue, scale;  ///< as in InsideRule
@@ -39,24 +39,23 @@ struct EdgeInput : LeafInput {
   std::uint64_t crossing[3][8];  ///< crossed edges by axis, as Crossed finds them
 };
 
-/// Leaves whose crossings are found together: a few hundred crossings, enough for long loops, and caches hold
-/// their ends.
+/// Leaves whose crossings are computed together: a few hundred crossings, enough for long loops, and the
+/// caches hold their ends.
 constexpr int kBatch = 8;
 constexpr int kMostCrossings = 3 * 512;  ///< most crossings that a leaf can own
 
-/// Finds the edges that start in the leaf and are crossed, by axis; `inside` and `beyond` as in SignLeaf.
-/// Returns how many.
+/// Finds the crossed edges that start in the leaf, by axis; `inside` and `beyond` as in SignLeaf. Returns
+/// their number.
 using Crossed = int(const std::uint64_t* inside, const std::uint64_t* beyond, std::uint64_t (*crossing)[8]);
 /// Computes the crossings of the crossed edges of `count` leaves with the same isovalue and scale, at most
 /// kBatch: by leaf, in it by axis, in that by sample. With t the offset, the gradient is that of both ends by
-/// central differences, interpolated: (1 − t) ∇v(s) + t ∇v(s + e). Packed crossings are as pack() has them,
-/// with tags of 0. Behind the last crossing `out` has room for kOutRoom more, whose content is undefined
-/// afterwards.
+/// central differences, interpolated: (1 − t) ∇v(s) + t ∇v(s + e). Packed crossings are as by pack(), with
+/// tags of 0. After the last crossing `out` has room for kOutRoom more, which are undefined afterwards.
 template <class Crossing>
 using Sample = void(const EdgeInput* leaves, int count, Crossing* out);
 constexpr int kOutRoom = 128;
 
-/// The kernels of one level of vector code, see simd_level.h.
+/// The kernels of one SIMD level, see simd_level.h.
 struct Kernels {
   SimdLevel level;
   Crossed* crossed;

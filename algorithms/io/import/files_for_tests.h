@@ -1,11 +1,8 @@
-// NIfTI files made by hand, byte by byte, for tests.
+// NIfTI files for tests.
 #pragma once
 
 #include <zlib.h>
 
-#include <algorithm>
-#include <array>
-#include <bit>
 #include <cstdint>
 #include <cstring>
 #include <filesystem>
@@ -13,13 +10,14 @@
 #include <string>
 #include <vector>
 
+#include "algorithms/io/stored_number.h"
+
 namespace hermesh {
 
-/// Appends a number in either order of bytes.
+/// Appends a number in either byte order.
 template <class T>
 void append_number(std::string& bytes, T value, bool big_endian = false) {
-  std::array<char, sizeof(T)> own = std::bit_cast<std::array<char, sizeof(T)>>(value);
-  if (big_endian != (std::endian::native == std::endian::big)) std::reverse(own.begin(), own.end());
+  const auto own = bytes_of_number(value, is_swapped(big_endian));
   bytes.append(own.data(), own.size());
 }
 
@@ -47,7 +45,7 @@ class NiftiBytes {
   NiftiBytes& put(std::size_t at, T value) {
     std::string number;
     append_number(number, value, big_endian_);
-    std::copy(number.begin(), number.end(), bytes_.begin() + static_cast<std::ptrdiff_t>(at));
+    bytes_.replace(at, number.size(), number);
     return *this;
   }
   template <class T>

@@ -1,7 +1,6 @@
 // glTF 2.0 out: one node with one mesh of one primitive.
-#include <bit>
-
 #include "algorithms/io/scenes/scene_files.h"
+#include "algorithms/io/stored_number.h"
 
 namespace hermesh::mesh_formats {
 
@@ -9,29 +8,24 @@ namespace {
 
 constexpr std::size_t kBufferPiece = std::size_t(1) << 16;
 
-/// The shortest text that reads back as the same number of the same precision.
-template <class T>
-std::string shortest(T value) {
-  char digits[32];
-  return {digits, std::to_chars(digits, digits + sizeof digits, value).ptr};
-}
-
 template <class Vector>
 std::string list_of(const Vector& numbers) {
-  return "[" + shortest(numbers[0]) + "," + shortest(numbers[1]) + "," + shortest(numbers[2]) + "]";
+  std::string text = "[";
+  for (const auto x : numbers) (text += NumberText(x)) += ',';
+  text.back() = ']';
+  return text;
 }
 
-/// Hands bytes on in large pieces, as they are or as base64.
+/// Passes bytes on in large pieces, unchanged or as base64.
 class BufferWriter {
  public:
   BufferWriter(const ByteSink& out, bool base64) : out_(out), base64_(base64) {}
 
   template <class T>
   void put(T value) {
-    std::array<char, sizeof(T)> bytes = std::bit_cast<std::array<char, sizeof(T)>>(value);
-    if constexpr (std::endian::native == std::endian::big) std::reverse(bytes.begin(), bytes.end());
+    const auto bytes = bytes_of_number(value);
     piece_.append(bytes.data(), bytes.size());
-    // A multiple of three bytes at a time, so that padding comes at the end alone.
+    // A multiple of three bytes at a time, so that base64 has padding only at its end.
     if (piece_.size() >= 3 * kBufferPiece) flush();
   }
 
@@ -41,7 +35,7 @@ class BufferWriter {
   }
 
  private:
-  /// The piece in base64: four digits for three bytes.
+  /// Returns the piece in base64: four digits for three bytes.
   std::string encoded() const {
     constexpr std::string_view digits = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
     std::string text;
@@ -50,7 +44,6 @@ class BufferWriter {
       std::uint32_t bits = 0;
       for (std::size_t k = 0; k < 3; ++k)
         bits = bits << 8 | (i + k < piece_.size() ? static_cast<unsigned char>(piece_[i + k]) : 0u);
-      // A digit that holds no bit of a byte is padding.
       for (std::size_t k = 0; k < 4; ++k)
         text += i + k <= piece_.size() ? digits[bits >> (18 - 6 * k) & 63] : '=';
     }
@@ -62,15 +55,15 @@ class BufferWriter {
   std::string piece_;
 };
 
-/// The JSON in front of what the URI of the buffer is, without its end.
+/// Returns the JSON up to the URI of the buffer.
 std::string json_of(const PolygonMesh& mesh) {
   const std::string head = R"({"asset":{"generator":"hermesh","version":"2.0"},"scene":0,"scenes":[{)";
-  // An accessor has at least one element, so that a mesh without triangles is a scene without nodes.
+  // An accessor has at least one element, so an empty mesh is a scene without nodes.
   if (mesh.empty()) return head + "}]";
   Eigen::Vector3f lower = mesh.points[0], upper = lower;
   for (const Eigen::Vector3f& point : mesh.points)
     lower = lower.cwiseMin(point), upper = upper.cwiseMax(point);
-  // The bounds are those of all points, used or not, as validators of the format compute them.
+  // Bounds of all points, used or not, as validators of the format compute them.
   const std::size_t points = mesh.points.size(), corners = 3 * mesh.triangle_count();
   std::string text = head + R"("nodes":[0]}],"nodes":[{"mesh":0)";
   if (const auto origin = stated_origin(mesh)) text += R"(,"translation":)" + list_of(*origin);
@@ -85,37 +78,23 @@ std::string json_of(const PolygonMesh& mesh) {
   return text;
 }
 
-/// The points, then the triangles. Other machines than little-endian ones turn each number.
+/// Writes the points, then the triangles.
 void write_buffer(const ByteSink& out, const PolygonMesh& mesh, bool base64) {
   BufferWriter buffer(out, base64);
   for (const Eigen::Vector3f& point : mesh.points)
     for (const float x : point) buffer.put(x);
-  const auto triangle = [&](std::uint32_t a, std::uint32_t b, std::uint32_t c) {
-    for (const std::uint32_t corner : {a, b, c}) buffer.put(corner);
-  };
-  for (const auto& [a, b, c] : mesh.triangles) triangle(a, b, c);
-  for (const auto& [a, b, c, d] : mesh.quads) triangle(a, b, c), triangle(a, c, d);
+  for_each_triangle(mesh, [&](auto... corners) { (buffer.put(std::uint32_t(corners)), ...); });
   buffer.flush();
-}
-
-/// A word of the container, little-endian.
-std::string word(std::uint64_t value) {
-  std::string bytes;
-  for (int i = 0; i < 4; ++i) bytes += static_cast<char>(value >> (8 * i) & 0xff);
-  return bytes;
 }
 
 }  // namespace
 
-std::optional<Eigen::Vector3d> stated_origin(const PolygonMesh& mesh) {
-  // As to_mesh_file() has it: left out only at 0, where a reader would choose 0 by itself.
-  if (mesh.origin.isZero(0.0) && choose_origin(bounds(mesh)).isZero(0.0)) return std::nullopt;
-  return mesh.origin;
-}
-
 void write_gltf(const ByteSink& out, const PolygonMesh& mesh, bool binary, const std::string& file) {
-  // By hand and not by a library: the text is short, and its bytes must not change with a version of somebody
-  // else's.
+  // Not by a library: the text is short, and its bytes must not change with the version of a library.
+  const auto word = [](std::uint64_t value) {
+    const auto bytes = bytes_of_number(static_cast<std::uint32_t>(value));
+    return std::string(bytes.data(), bytes.size());
+  };
   std::string json = json_of(mesh);
   if (!binary) {
     out(json);
@@ -128,12 +107,13 @@ void write_gltf(const ByteSink& out, const PolygonMesh& mesh, bool binary, const
     return;
   }
   json += mesh.empty() ? "}" : "}]}";
-  // Chunks begin at multiples of four bytes; JSON is padded by blanks, and the buffer is all words.
+  // Chunks begin at multiples of four bytes; JSON is padded by blanks, and the buffer consists of words.
   while (json.size() % 4 != 0) json += ' ';
   const std::uint64_t bytes = mesh.empty() ? 0 : 12 * (mesh.points.size() + mesh.triangle_count());
   const std::uint64_t length = 20 + json.size() + (mesh.empty() ? 0 : 8 + bytes);
   if (length > 0xffffffff)
-    throw Error("cannot write " + in_quotes(file) + ": a .glb file holds 4 GB at most; write .gltf or .ply");
+    throw Error(
+        joined("cannot write ", in_quotes(file), ": a .glb file holds 4 GB at most; write .gltf or .ply"));
   out("glTF" + word(2) + word(length) + word(json.size()) + "JSON" + json);
   if (mesh.empty()) return;
   out(word(bytes) + std::string("BIN\0", 4));

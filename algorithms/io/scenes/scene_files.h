@@ -1,4 +1,4 @@
-// Readers and writers of formats that place parts in a scene: glTF 2.0 and 3MF. Private to algorithms/io.
+// Readers and writers of formats that arrange parts in a scene: glTF 2.0 and 3MF. Private to algorithms/io.
 #pragma once
 
 #include <functional>
@@ -12,39 +12,83 @@ namespace hermesh::mesh_formats {
 /// Takes the bytes of a file piece by piece, in their order.
 using ByteSink = std::function<void(std::string_view)>;
 
-/// Reads the triangles of the default scene of a glTF 2.0 file in binary (.glb), each node's mesh in its
-/// place. Points of one mesh are shared where all three coordinates are equal, since the format repeats them
-/// along seams of normals and textures.
+/// Reads the triangles of the default scene of a glTF 2.0 file in binary (.glb). Points of one mesh are
+/// shared if all three coordinates are equal, since the format repeats them along seams of normals and
+/// textures.
 /// @throws Error for a damaged or compressed file, or one that requires an extension by which its shape
 /// changes.
 void read_glb(std::string_view bytes, MeshBuilder& builder);
-/// Reads a glTF 2.0 file in text (.gltf) as above. Its buffers are in the file, or files beside it or in
-/// folders beneath.
-/// @throws Error as above, and for a buffer that is elsewhere or cannot be read.
+/// Reads a glTF 2.0 file in text (.gltf) as above. Its buffers are in the file itself, or files in its
+/// directory or below. @throws Error as above, and for a buffer that is elsewhere or cannot be read.
 void read_gltf(std::string_view bytes, MeshBuilder& builder);
-/// Whether the bytes begin as a .glb file does.
+/// True if the bytes begin like a .glb file.
 bool begins_like_glb(std::string_view bytes);
 
-/// Reads the objects of a 3MF file that its build places, with components, and those of the production
-/// extension in files of their own. A unit other than the millimetre is noted, and changes no number.
-/// @throws Error for a damaged file, or one that requires an extension by which its shape changes.
+/// Reads the objects that the build of a 3MF file lists, with components, including those that the production
+/// extension stores in separate files. A unit other than the millimetre is noted, and changes no number.
+/// @throws Error for a damaged file, or one that requires an extension that changes its shape.
 void read_three_mf(std::string_view bytes, MeshBuilder& builder);
 
-/// Writes a mesh as glTF 2.0 with its buffer within, as .glb or as text. Quads become two triangles. The
+/// Writes a mesh as glTF 2.0 with its buffer inside, as .glb or as text. Quads become two triangles. The
 /// points are those of the mesh in single precision, and its origin is the translation of the node, so that
 /// nothing is rounded.
-/// @throws Error where a .glb file, whose lengths have 32 bits, has no room.
+/// @throws Error if the mesh is too large for a .glb file, whose lengths have 32 bits.
 void write_gltf(const ByteSink& out, const PolygonMesh& mesh, bool binary, const std::string& file);
 
 /// Writes a mesh as 3MF; `unit` is the format's word for the unit of the coordinates. Quads become two
 /// triangles; triangles with a corner twice, which the format forbids, are left out with a note. Numbers are
 /// the shortest text of the double; the origin of the mesh is the translation of the build's item. The packed
-/// file waits in memory until it is whole.
+/// file is built in memory.
 void write_three_mf(const ByteSink& out, const PolygonMesh& mesh, std::string_view unit,
                     const std::string& file, RunContext& context);
 
-/// The origin that a file of these formats has to state, since a reader would choose another; none where it
-/// need not.
+/// Returns the origin that a file of these formats has to state because a reader would choose another one.
 std::optional<Eigen::Vector3d> stated_origin(const PolygonMesh& mesh);
+
+/// An affine map of points in double precision. Not an Eigen transform, whose products would also multiply
+/// the last row.
+struct Placement {
+  Eigen::Matrix3d linear = Eigen::Matrix3d::Identity();
+  Eigen::Vector3d translation = Eigen::Vector3d::Zero();
+
+  Eigen::Vector3d operator()(const Eigen::Vector3d& point) const { return linear * point + translation; }
+  /// Returns the map that applies `inner` first.
+  Placement operator*(const Placement& inner) const {
+    return {linear * inner.linear, (*this)(inner.translation)};
+  }
+};
+
+/// Triangles over points of their own, in the coordinates of the part.
+struct ScenePart {
+  std::vector<Eigen::Vector3d> points;
+  std::vector<Triangle> triangles;  ///< every corner is a point of the part
+
+  /// Returns the bytes that one more copy of the part takes in a mesh.
+  double cost() const {
+    return double(points.size() * sizeof(Eigen::Vector3d) + triangles.size() * sizeof(Triangle));
+  }
+};
+
+/// Adds parts to the mesh of a builder and sums up their memory, so that a small file which repeats its parts
+/// millions of times is refused before the memory is taken.
+class PartPlacer {
+ public:
+  explicit PartPlacer(MeshBuilder& builder) : builder_(builder) {}
+
+  /// Counts bytes that are about to be taken, or work that takes as long as writing them. @throws Error if
+  /// the sum exceeds half of the machine's memory.
+  void spend(double bytes);
+  /// Adds a copy of the part, whose cost was spent before. A mirroring placement reverses its triangles, so
+  /// that they still face outwards; a flattening one leaves the part out. @throws Error if the placement is
+  /// not finite.
+  void place(const ScenePart& part, const Placement& placement);
+  /// Notes the number of parts that were left out.
+  void note_left_out();
+
+ private:
+  MeshBuilder& builder_;
+  double spent_ = 0.0;
+  std::size_t flattened_ = 0;
+};
 
 }  // namespace hermesh::mesh_formats

@@ -3,12 +3,12 @@
 #include <atomic>
 #include <cstdlib>
 
-#include "algorithms/io/mesh_units.h"
+#include "algorithms/io/mesh_file.h"
 #include "algorithms/io/scenes/scene_files_for_tests.h"
 #include "algorithms/io/test_mesh_files.h"
 
 namespace hermesh {
-namespace {
+namespace three_mf_file_test {
 
 using Eigen::Vector3d;
 using Points = std::vector<Vector3d>;
@@ -32,7 +32,7 @@ class ThreeMfFileTest : public MeshFileTest {
   /// Holds that the sentence about this model names the file and has these words in it.
   void expect_error(const std::string& model, const std::string& part) {
     const std::string sentence = error_of(model);
-    EXPECT_NE(sentence.find(part), std::string::npos) << sentence << "\nrather than " << part;
+    expect_words(sentence, part);
     EXPECT_EQ(sentence.rfind("'a.3mf'", 0), 0u) << sentence;
   }
 };
@@ -76,14 +76,13 @@ TEST_F(ThreeMfFileTest, AUnitOtherThanTheMillimetreIsANote) {
   EXPECT_EQ(read(model_of(object_of(1, kTriangle), "<item objectid=\"1\"/>", "unit=\"inch\"")).points[1],
             Vector3d(1, 0, 0));
   ASSERT_EQ(context.notes.size(), 1u);
-  EXPECT_EQ(context.notes[0],
-            "'a.3mf': its lengths are of the unit 'inch'; the numbers were taken as they are");
+  EXPECT_EQ(context.notes[0], "'a.3mf': its lengths are of the unit 'inch'; the numbers are unchanged");
   read(model_of(object_of(1, kTriangle), "<item objectid=\"1\"/>", "unit=\"millimeter\""));
   EXPECT_EQ(context.notes.size(), 1u);
 }
 
 TEST_F(ThreeMfFileTest, PrefixesAreThoseOfTheNamespaces) {
-  // As Python's XML library writes it. What has another prefix is of another extension.
+  // As written by Python's XML library. Elements with another prefix belong to another extension.
   const std::string model =
       "<ns0:model xmlns:ns0=\"http://schemas.microsoft.com/3dmanufacturing/core/2015/02\" "
       "xmlns:s=\"urn:other\"><!-- <a> -->"
@@ -124,9 +123,7 @@ TEST_F(ThreeMfFileTest, ObjectsMayLieInFilesOfTheirOwn) {
                    {name, model_of(object_of(1, kTriangle), "")}});
   };
   EXPECT_EQ(MeshFileTest::read("a.3mf", archive("3D/Objects/part.model")).points[2], Vector3d(0, 2, 5));
-  EXPECT_NE(
-      MeshFileTest::error_of("a.3mf", archive("3D/other.model")).find("no file '3D/Objects/Part.model'"),
-      std::string::npos);
+  expect_words(MeshFileTest::error_of("a.3mf", archive("3D/other.model")), "no file '3D/Objects/Part.model'");
 }
 
 TEST_F(ThreeMfFileTest, DamageIsASentence) {
@@ -176,40 +173,62 @@ TEST_F(ThreeMfFileTest, DamageIsASentence) {
 TEST_F(ThreeMfFileTest, TheArchiveIsChecked) {
   const std::string whole = three_mf_of(model_of(object_of(1, kTriangle), "<item objectid=\"1\"/>"));
   for (std::size_t size = 4; size < whole.size(); ++size)
-    EXPECT_NE(MeshFileTest::error_of("a.3mf", whole.substr(0, size)).find("truncated"), std::string::npos)
-        << size;
+    expect_words(MeshFileTest::error_of("a.3mf", whole.substr(0, size)), "truncated");
   const auto error = [&](const std::string& name, const std::string& bytes) {
     return MeshFileTest::error_of(name, bytes);
   };
-  EXPECT_NE(error("a.3mf", zip_of({{"word/document.xml", "<w/>"}})).find("without a model of 3MF"),
-            std::string::npos);
-  EXPECT_NE(error("a.3mf", "solid\n").find("is named .3mf but holds STL"), std::string::npos);
-  EXPECT_NE(error("a.stl", whole).find("is named .stl but holds a ZIP archive"), std::string::npos);
-  // In the directory, by offsets from the signature of the last entry: flags at 8, method at 10, checksum at
-  // 16, length at 24.
-  const std::size_t entry = whole.rfind("PK\1\2");
-  const auto changed = [&](std::size_t at, char value) {
+  expect_words(error("a.3mf", zip_of({{"word/document.xml", "<w/>"}})), "without a model of 3MF");
+  expect_words(error("a.3mf", "solid\n"), "is named .3mf but holds STL");
+  expect_words(error("a.stl", whole), "is named .stl but holds a ZIP archive");
+  // Offsets from the signature of the last entry of the directory, and from that of its local header: flags
+  // at 8 and 6, method at 10 and 8, checksum at 16 and 14, length at 24 and 22.
+  const std::size_t entry = whole.rfind("PK\1\2"), local = whole.rfind("PK\3\4");
+  const auto changed = [&](std::size_t at, int value, std::size_t local_at = 0) {
     std::string bytes = whole;
-    bytes[entry + at] = value;
+    bytes[entry + at] = char(value);
+    if (local_at > 0) bytes[local + local_at] = char(value);
     return error("a.3mf", bytes);
   };
-  EXPECT_NE(changed(8, 1).find("encrypted"), std::string::npos);
-  EXPECT_NE(changed(10, 12).find("method 12"), std::string::npos);
-  EXPECT_NE(changed(16, char(whole[entry + 16] + 1)).find("another checksum"), std::string::npos);
-  EXPECT_NE(changed(24, char(whole[entry + 24] + 1)).find("does not unpack"), std::string::npos);
-  EXPECT_NE(changed(27, 127).find("a length that it cannot have"), std::string::npos);
-  EXPECT_NE(changed(44, 127).find("is not where"), std::string::npos);
-  // Marks of an end in a comment: a few are passed over, thousands are refused before the directory is read
-  // for each.
-  const auto with_marks = [&](int count) {
-    std::string bytes = whole, comment;
+  expect_words(changed(8, 1), "encrypted");
+  expect_words(changed(10, 12), "method 12");
+  expect_words(changed(16, whole[entry + 16] + 1, 14), "another checksum");
+  expect_words(changed(24, whole[entry + 24] + 1, 22), "does not unpack");
+  expect_words(changed(24, whole[entry + 24] - 1, 22), "another checksum");
+  expect_words(changed(27, 127), "an impossible length");
+  for (const std::size_t at : {16, 24, 44})
+    expect_words(changed(at, whole[entry + at] + 1), "does not agree");
+  // A flipped bit anywhere in the packed data is found, if only by the checksum. Their last byte has unused
+  // bits.
+  for (std::size_t at = local + 46; at + 1 < whole.find("PK\1\2"); ++at) {
+    std::string bytes = whole;
+    bytes[at] = char(bytes[at] ^ 4);
+    EXPECT_NE(error("a.3mf", bytes), "") << at;
+  }
+  // Marks of an end in a comment are ignored, even thousands.
+  for (const int count : {2, 2800}) {
+    std::string comment;
     for (int i = 0; i < count; ++i) comment += "PK\5\6 some comment of 22";
-    bytes[bytes.size() - 2] = char(comment.size() & 255);
-    bytes[bytes.size() - 1] = char(comment.size() >> 8);
-    return error("a.3mf", bytes + comment);
+    const std::string length = raw(std::uint16_t(comment.size()));
+    EXPECT_EQ(error("a.3mf", whole.substr(0, whole.size() - 2) + length + comment), "");
+  }
+  // As are a whole archive in the comment, and bytes behind the archive.
+  const std::string other = zip_of({{"word/document.xml", "<w/>"}});
+  EXPECT_EQ(error("a.3mf", whole.substr(0, whole.size() - 2) + raw(std::uint16_t(other.size())) + other), "");
+  EXPECT_EQ(error("a.3mf", whole + std::string(100, '\0')), "");
+}
+
+/// Of two members of one name the first counts; names are compared without case and leading slash.
+TEST_F(ThreeMfFileTest, DuplicateAndOddNames) {
+  const std::string item = "<item objectid=\"1\"/>";
+  const std::string good = model_of(object_of(1, kTriangle), item), bad = "<svg/>";
+  const auto error = [&](const std::vector<std::pair<std::string, std::string>>& members) {
+    return MeshFileTest::error_of("a.3mf", zip_of(members));
   };
-  EXPECT_EQ(with_marks(2), "");
-  EXPECT_NE(with_marks(2900).find("more ends than one"), std::string::npos);
+  EXPECT_EQ(error({{"3D/3dmodel.model", good}, {"3D/3dmodel.model", bad}}), "");
+  EXPECT_EQ(error({{"/3d/3DMODEL.model", good}}), "");
+  EXPECT_EQ(error({{"3d/3dmodel.model", bad}, {"3D/3dmodel.model", good}}), "");  // the exact name first
+  EXPECT_EQ(error({{std::string(3000, 'a'), bad}, {"../../x", bad}, {"3D/3dmodel.model", good}}), "");
+  expect_words(error({{"3D/3dmodel.model ", good}}), "without a model");
 }
 
 TEST_F(ThreeMfFileTest, EncodingsAndCharactersByNumberAreRead) {
@@ -264,8 +283,8 @@ TEST_F(ThreeMfFileTest, WritingCanBeCancelled) {
   EXPECT_TRUE(files().empty());
 }
 
-/// A directory that declares 400 MB: what is packed could hold them, but no text of a mesh packs to a
-/// thousandth.
+/// A directory that declares 400 MB: the compressed data could expand to that size, but the text of a mesh
+/// never compresses to a thousandth.
 TEST_F(ThreeMfFileTest, ArchivesMadeToDoHarmAreRefused) {
   std::string noise;
   std::mt19937 random(1);
@@ -274,7 +293,7 @@ TEST_F(ThreeMfFileTest, ArchivesMadeToDoHarmAreRefused) {
   const std::size_t entry = archive.rfind("PK\1\2");
   const std::uint32_t length = 400'000'000;
   for (int i = 0; i < 4; ++i) archive[entry + 24 + std::size_t(i)] = char(length >> 8 * i);
-  EXPECT_NE(MeshFileTest::error_of("a.3mf", archive).find("which is the limit"), std::string::npos);
+  expect_words(MeshFileTest::error_of("a.3mf", archive), "which is the limit");
 }
 
 TEST_F(ThreeMfFileTest, TheUnitIsTheMillimetreUnlessItIsKnown) {
@@ -285,7 +304,7 @@ TEST_F(ThreeMfFileTest, TheUnitIsTheMillimetreUnlessItIsKnown) {
       std::ranges::none_of(context.notes, [](const auto& note) { return note.find("unit") != note.npos; }));
   write_mesh_in_metres(folder / "b.3mf", mesh, context);
   EXPECT_EQ(read_mesh(folder / "b.3mf", context), read_back);
-  EXPECT_NE(context.notes.back().find("'meter'"), std::string::npos);
+  expect_words(context.notes.back(), "'meter'");
 }
 
 /// Ten objects of ten components each would be ten thousand million triangles.
@@ -299,20 +318,20 @@ TEST_F(ThreeMfFileTest, RepetitionDoesNotEatMemory) {
     }
     return model_of(objects, "<item objectid=\"" + std::to_string(1 + levels) + "\"/>");
   };
-  EXPECT_NE(error_of(levels_of_ten(10)).find("half of the memory"), std::string::npos);
+  expect_words(error_of(levels_of_ten(10)), "half of the memory");
   objects = object_of(1, "");  // nothing, as many times
-  EXPECT_NE(error_of(levels_of_ten(20)).find("half of the memory"), std::string::npos);
+  expect_words(error_of(levels_of_ten(20)), "half of the memory");
 }
 
 TEST_F(ThreeMfFileTest, LongChainsOfComponentsAreRefused) {
-  // Items in ascending order, so that each chain is one longer than what was summed up before.
+  // Items in ascending order, so that each chain is one longer than the part that was summed up before.
   std::string objects = object_of(1, kTriangle), items = "<item objectid=\"1\"/>";
   for (int id = 2; id < 20000; ++id) {
     objects +=
         object_of(id, "<components><component objectid=\"" + std::to_string(id - 1) + "\"/></components>");
     items += "<item objectid=\"" + std::to_string(id) + "\"/>";
   }
-  EXPECT_NE(error_of(model_of(objects, items)).find("more than 100 deep"), std::string::npos);
+  expect_words(error_of(model_of(objects, items)), "more than 100 deep");
 }
 
 TEST_F(ThreeMfFileTest, TrianglesWithACornerTwiceAreLeftOutWithANote) {
@@ -322,9 +341,9 @@ TEST_F(ThreeMfFileTest, TrianglesWithACornerTwiceAreLeftOutWithANote) {
   mesh.quads.push_back({0, 1, 2, 2});
   write_mesh(folder / "a.3mf", mesh, context);
   EXPECT_EQ(context.notes.size(), 1u);
-  EXPECT_NE(context.notes[0].find("2 triangles with a corner twice"), std::string::npos) << context.notes[0];
+  expect_words(context.notes[0], "2 triangles with a corner twice");
   EXPECT_EQ(read_mesh(folder / "a.3mf", context).triangles, (Triangles{{0, 1, 2}, {0, 1, 2}}));
 }
 
-}  // namespace
+}  // namespace three_mf_file_test
 }  // namespace hermesh

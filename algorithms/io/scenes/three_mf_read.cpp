@@ -1,24 +1,218 @@
-// 3MF (3MF Consortium, core specification 1.3, production extension 1.1): XML in a ZIP archive.
+// 3MF (3MF Consortium, core specification 1.3, production extension 1.1): XML in a ZIP archive, by expat and
+// minizip.
+#include <expat.h>
+#include <malloc.h>
+
+#include <algorithm>
+#include <cstdlib>
+#include <exception>
 #include <map>
 #include <memory>
+#include <new>
 
 #include "algorithms/io/scenes/scene_files.h"
-#include "algorithms/io/scenes/scene_part.h"
-#include "algorithms/io/scenes/xml_reader.h"
 #include "algorithms/io/scenes/zip_archive.h"
 
 namespace hermesh::mesh_formats {
 
 namespace {
 
-/// How deeply components may be nested; a file that goes deeper is damaged, or contains itself.
+/// Deepest nesting of elements in undamaged files.
+constexpr std::size_t kDeepestElement = 1000;
+constexpr std::size_t kParsedPiece = std::size_t(1) << 18;
+/// Bytes of an element's text that are stored; only short words are needed.
+constexpr std::size_t kMostText = 1000;
+/// Memory that the parsers of a thread may take. They store each name once and the current tag as a whole,
+/// which has millions of bytes only in malicious files.
+constexpr std::size_t kMostTaken = std::size_t(1) << 23;
+thread_local std::size_t taken = 0;
+
+void* take_again(void* old, std::size_t size) {
+  const std::size_t before = malloc_usable_size(old);
+  if (size > kMostTaken - std::min(taken - before, kMostTaken)) return nullptr;
+  void* const now = std::realloc(old, size);
+  if (now) taken += malloc_usable_size(now) - before;
+  return now;
+}
+void* take(std::size_t size) { return take_again(nullptr, size); }
+void give_back(void* memory) {
+  taken -= malloc_usable_size(memory);
+  std::free(memory);
+}
+constexpr XML_Memory_Handling_Suite kMemory = {take, take_again, give_back};
+
+/// Parses the XML of a member of an archive while it is unpacked, without a tree in memory, and calls the
+/// visitors of its elements. Comments, processing instructions and everything behind the first element are
+/// ignored. A document type is refused, as formats based on XML do, since its entities can make a few bytes
+/// into millions. Errors name the line; if the archive is damaged, that is the error.
+class XmlReader {
+ public:
+  using Visit = std::function<void()>;
+
+  /// Opens the member; `what` names the text in messages.
+  XmlReader(ZipArchive& archive, const std::string& member, std::string what, MeshBuilder& builder)
+      : archive_(archive),
+        what_(std::move(what)),
+        builder_(builder),
+        parser_(XML_ParserCreate_MM(nullptr, &kMemory, nullptr)) {
+    archive_.open(member);
+    XML_Parser const parser = parser_.get();
+    if (!parser) throw std::bad_alloc();
+    XML_SetUserData(parser, this);
+    XML_SetElementHandler(
+        parser,
+        [](void* user, const char* name, const char** attributes) { self(user).start(name, attributes); },
+        [](void* user, const char*) { self(user).end(); });
+    XML_SetCharacterDataHandler(parser, [](void* user, const char* piece, int size) {
+      std::string& text = self(user).text_;
+      if (self(user).text_visit_ && text.size() < kMostText)
+        self(user).guard([&] { text.append(piece, static_cast<std::size_t>(size)); });
+    });
+    // Called before the first entity is declared.
+    XML_SetStartDoctypeDeclHandler(parser, [](void* user, const char*, const char*, const char*, int) {
+      self(user).guard([&] { self(user).fail("a document type, which files of this kind must not have"); });
+    });
+  }
+  XmlReader(const XmlReader&) = delete;
+  XmlReader& operator=(const XmlReader&) = delete;
+
+  /// Parses the text and calls `visit` at the start of its first element. @throws Error if the text is not
+  /// well-formed or the archive is damaged, and everything that a visitor throws.
+  void read(const Visit& visit) {
+    visits_ = {visit};
+    XML_ParsingStatus state = {XML_INITIALIZED, XML_FALSE};
+    while (state.parsing != XML_FINISHED) {
+      builder_.context().check();
+      void* const room = XML_GetBuffer(parser_.get(), kParsedPiece);
+      if (!room) fail_by(XML_GetErrorCode(parser_.get()));
+      const std::size_t size = archive_.read({static_cast<char*>(room), kParsedPiece});
+      const XML_Status status = XML_ParseBuffer(parser_.get(), static_cast<int>(size), size == 0);
+      if (thrown_) std::rethrow_exception(thrown_);
+      XML_GetParsingStatus(parser_.get(), &state);
+      // end() aborts at the end of the first element.
+      const XML_Error error = XML_GetErrorCode(parser_.get());
+      if (status != XML_STATUS_OK && error != XML_ERROR_ABORTED) fail_by(error);
+    }
+    read_rest();
+  }
+
+  // For visitors, about the element that has just started.
+
+  /// Calls `visit` at the start of each child, after the caller has returned: references in `visit` must be
+  /// valid until then.
+  void for_each_child(Visit visit) { visits_.back() = std::move(visit); }
+  /// Calls `visit` at the end of the element with its text, cut to about a thousand bytes.
+  void for_text(std::function<void(std::string_view)> visit) {
+    text_visit_ = std::move(visit);
+    text_level_ = visits_.size();
+    text_.clear();
+  }
+  /// Returns the name without the prefix of its namespace.
+  std::string_view name() const { return name_.substr(name_.find(':') + 1); }
+  /// True if the element has this name, and the prefix of the first element.
+  bool is(std::string_view name) const { return this->name() == name && prefix() == root_prefix_; }
+  /// Returns the value of an attribute by its whole name.
+  std::optional<std::string_view> attribute(std::string_view name) const {
+    for (const char** each = attributes_; *each; each += 2)
+      if (each[0] == name) return each[1];
+    return std::nullopt;
+  }
+  /// Returns the prefix that the element declares for a namespace whose address contains `part`.
+  std::optional<std::string_view> prefix_for(std::string_view part) const {
+    constexpr std::string_view declares = "xmlns:";
+    for (const char** each = attributes_; *each; each += 2)
+      if (std::string_view(each[0]).starts_with(declares) &&
+          std::string_view(each[1]).find(part) != std::string_view::npos)
+        return each[0] + declares.size();
+    return std::nullopt;
+  }
+  /// @throws Error about the current line.
+  template <class... Parts>
+  [[noreturn]] void fail(const Parts&... what) {
+    const std::size_t line = XML_GetCurrentLineNumber(parser_.get());
+    // If the archive is damaged, that is the cause of a wrong text.
+    read_rest();
+    builder_.fail("line ", line, " of its ", what_, ": ", what...);
+  }
+
+ private:
+  struct Free {
+    void operator()(XML_Parser parser) const { XML_ParserFree(parser); }
+  };
+  static XmlReader& self(void* user) { return *static_cast<XmlReader*>(user); }
+
+  /// Runs `work` for the parser, which calls from C, so that no exception may leave it.
+  template <class Work>
+  void guard(Work&& work) {
+    // The parser reports the end of an element even if it was stopped at its start.
+    if (thrown_) return;
+    try {
+      work();
+    } catch (...) {
+      thrown_ = std::current_exception();
+      XML_StopParser(parser_.get(), XML_FALSE);
+    }
+  }
+  void start(const char* name, const char** attributes) {
+    guard([&] {
+      builder_.tick(archive_.done(), archive_.size());
+      if (visits_.size() > kDeepestElement) fail("elements are nested too deeply; the file is damaged");
+      name_ = name, attributes_ = attributes;
+      if (visits_.size() == 1) root_prefix_ = prefix();
+      visits_.emplace_back();
+      if (const Visit& visit = visits_[visits_.size() - 2]) visit();
+    });
+  }
+  void end() {
+    guard([&] {
+      if (text_visit_ && visits_.size() == text_level_) std::exchange(text_visit_, nullptr)(text_);
+      visits_.pop_back();
+      if (visits_.size() == 1) XML_StopParser(parser_.get(), XML_FALSE);
+    });
+  }
+  std::string_view prefix() const {
+    const std::size_t colon = name_.find(':');
+    return name_.substr(0, colon == std::string_view::npos ? 0 : colon);
+  }
+  /// Reads the rest of the member, whose checksum is compared at its end.
+  void read_rest() {
+    std::string room(kParsedPiece, '\0');
+    while (archive_.read(room) > 0) builder_.context().check();
+  }
+  [[noreturn]] void fail_by(XML_Error error) {
+    switch (error) {
+      case XML_ERROR_NO_ELEMENTS:
+      case XML_ERROR_UNCLOSED_TOKEN:
+      case XML_ERROR_PARTIAL_CHAR:
+      case XML_ERROR_UNCLOSED_CDATA_SECTION:
+        fail("the text breaks off; the file is truncated or damaged");
+      case XML_ERROR_NO_MEMORY:
+        fail("a tag of millions of bytes, or as many names; the file is damaged");
+      default:
+        fail(XML_ErrorString(error), "; the file is damaged");
+    }
+  }
+
+  ZipArchive& archive_;
+  std::string what_;
+  MeshBuilder& builder_;
+  std::unique_ptr<XML_ParserStruct, Free> parser_;
+  std::exception_ptr thrown_;
+  std::vector<Visit> visits_;  ///< of the children of each open element; the first one is for the root
+  std::function<void(std::string_view)> text_visit_;
+  std::size_t text_level_ = 0;
+  std::string text_;
+  std::string_view name_;
+  const char** attributes_ = nullptr;  ///< keys and values in turn, then null
+  std::string root_prefix_;
+};
+
+/// Deepest nesting of components; a file beyond it is damaged, or contains itself.
 constexpr int kDeepestObject = 100;
-/// Bytes that the work on one component counts for, so that components of nothing cannot keep it busy for
-/// ever.
+/// Bytes that the work on one component counts for, so that empty components cannot go on for ever.
 constexpr double kVisit = 1024.0;
 
-/// Extensions that a file may require although nothing is known of them here: none changes where a triangle
-/// is.
+/// True for extensions that a file may require although they are unknown here: none moves a triangle.
 bool address_leaves_shapes_alone(std::string_view address) {
   for (const char* part : {"/3dmanufacturing/production/", "/3dmanufacturing/material/",
                            "/3dmanufacturing/slice/", "/3dmanufacturing/trianglesets/"})
@@ -26,7 +220,7 @@ bool address_leaves_shapes_alone(std::string_view address) {
   return false;
 }
 
-/// The text without white space about it, which XML allows in values of numbers.
+/// Returns the text without the surrounding white space that XML allows in values of numbers.
 std::string_view trimmed(std::string_view text) {
   while (!text.empty() && is_space(text.front())) text.remove_prefix(1);
   while (!text.empty() && is_space(text.back())) text.remove_suffix(1);
@@ -36,22 +230,22 @@ std::string_view trimmed(std::string_view text) {
 /// An object by its file within the archive and its number there.
 using ObjectKey = std::pair<std::string, std::uint32_t>;
 
-/// An object in a place: a component of another one, or an item of the build.
+/// A placed object: a component of another one, or an item of the build.
 struct Component {
   ObjectKey object;
   Placement placement;
-  bool is_placed = false;  ///< whether the file states the placement
+  bool is_placed = false;  ///< true if the file states the placement
 };
 
 struct SceneObject {
   ScenePart part;
   std::vector<Component> components;
-  double cost = -1.0;  ///< of the object with all its components; negative until it was summed up
+  double cost = -1.0;  ///< of the object with all its components; negative until it is known
   int height = 0;      ///< levels of components beneath it
 };
 
-/// Reads one file. Models are gone through once, element by element; what the build places is put together
-/// afterwards, since an object may be composed of others.
+/// Reads one file: parses its models once, then assembles the objects that the build lists, since an object
+/// may be composed of others.
 class ThreeMfReader {
  public:
   ThreeMfReader(std::string_view bytes, MeshBuilder& builder)
@@ -61,7 +255,7 @@ class ThreeMfReader {
     const std::string root = root_model();
     read_model(root, true);
     if (items_.empty()) builder_.fail("its build places no object, so there is nothing to read");
-    // What all copies take is known before the first one is made.
+    // The memory of all copies is checked before the first one is made.
     for (const Component& item : items_) placer_.spend(cost_of(item.object, 0));
     for (const Component& item : items_) place(item, Placement());
     placer_.note_left_out();
@@ -70,14 +264,13 @@ class ThreeMfReader {
   }
 
  private:
-  /// Name of the member that the package calls its model.
+  /// Returns the name of the member that the package declares as its model.
   std::string root_model() {
     constexpr const char* relationships = "_rels/.rels";
-    // Where every writer puts it, although the format leaves the name open.
-    constexpr const char* usual = "3D/3dmodel.model";
+    constexpr const char* usual = "3D/3dmodel.model";  // in practice; the format leaves the name open
     std::string result;
     if (archive_.has(relationships)) {
-      XmlReader xml(archive_.open(relationships), relationships, builder_);
+      XmlReader xml(archive_, relationships, relationships, builder_);
       const auto find_model = [&] {
         const auto type = xml.attribute("Type"), target = xml.attribute("Target");
         if (result.empty() && type && target && type->ends_with("/3dmodel")) result = *target;
@@ -92,23 +285,25 @@ class ThreeMfReader {
     return result;
   }
 
-  /// Reads the objects of a model, and the items of its build where it is the root.
+  /// Reads the objects of a model, and the items of its build if it is the root.
   void read_model(const std::string& name, bool root) {
     models_.push_back(name);
-    XmlReader xml(archive_.open(name), "model", builder_);
+    XmlReader xml(archive_, name, "model", builder_);
     xml.read([&] {
       if (xml.name() != "model")
         xml.fail("the first element is no model; the file is damaged or of another kind");
       check_extensions(xml);
-      if (root) note_unit(xml.attribute("unit").value_or("millimeter"));
-      // Names of files stand in attributes of the production extension, under the prefix that this model
-      // gives it.
+      // Most files are in millimetres, the unit that slicers assume for STL, too.
+      const std::string_view unit = xml.attribute("unit").value_or("millimeter");
+      if (root && unit != "millimeter")
+        builder_.note("its lengths are of the unit ", quoted_word(unit), "; the numbers are unchanged");
+      // The production extension names files by attributes under the prefix that this model declares.
       path_attribute_ = std::string(xml.prefix_for("/3dmanufacturing/production/").value_or("p")) + ":path";
       xml.for_each_child([&] { read_part(xml, name, root); });
     });
   }
 
-  /// Reads what stands directly in a model.
+  /// Reads a child of the model.
   void read_part(XmlReader& xml, const std::string& model, bool root) {
     if (xml.is("resources"))
       xml.for_each_child([&] {
@@ -122,35 +317,27 @@ class ThreeMfReader {
       });
   }
 
-  /// Refuses a model that says itself that it cannot be read without knowing an extension by which shapes
-  /// change.
+  /// Refuses a model that requires an extension by which shapes change: a list of prefixes, for which the
+  /// same element declares addresses.
   void check_extensions(XmlReader& xml) {
-    // A list of prefixes, which stand for addresses that the same element declares.
     std::string_view required = trimmed(xml.attribute("requiredextensions").value_or(""));
     while (!required.empty()) {
       const std::size_t end = std::min(required.find_first_of(" \t\r\n"), required.size());
       const std::string prefix(required.substr(0, end));
       const std::string_view address = xml.attribute("xmlns:" + prefix).value_or(prefix);
       if (!address_leaves_shapes_alone(address))
-        builder_.fail("it requires the extension " + quoted_word(address) +
+        builder_.fail("it requires the extension ", quoted_word(address),
                       ", which is not read; export it without");
       required = trimmed(required.substr(end));
     }
   }
 
-  void note_unit(std::string_view unit) {
-    // By far the most files are in millimetres, which is what slicers take the numbers of STL for, too.
-    if (unit != "millimeter")
-      builder_.note("its lengths are of the unit " + quoted_word(unit) +
-                    "; the numbers were taken as they are");
-  }
-
-  /// Reads an object, which is a mesh or is composed of others. What else it may be belongs to extensions.
+  /// Reads an object, which is a mesh or is composed of others; all else belongs to extensions.
   void read_object(XmlReader& xml, const std::string& model) {
     const ObjectKey key{model, whole_number(xml, "id")};
     if (objects_.contains(key))
-      xml.fail("the second object with the id " + std::to_string(key.second) + "; the file is damaged");
-    // The entry stays in its place while its components are read, whatever they refer to.
+      xml.fail("the second object with the id ", key.second, "; the file is damaged");
+    // References to entries of a map stay valid while other objects are added.
     SceneObject& object = objects_[key];
     xml.for_each_child([&] {
       if (xml.is("mesh")) read_mesh(xml, object.part);
@@ -161,14 +348,14 @@ class ThreeMfReader {
     });
   }
 
-  /// Reads a mesh, and makes points with equal coordinates one: the format wants them shared, and some
-  /// programs write each triangle with points of its own.
+  /// Reads a mesh and merges points with equal coordinates: the format wants them shared, but some programs
+  /// write each triangle with points of its own.
   void read_mesh(XmlReader& xml, ScenePart& part) {
     struct Points {
       PointMerger merger;
       std::vector<std::uint32_t> numbers;
     };
-    // It lives as long as somebody may be called who adds to it.
+    // Shared by the visitors below, which are called after this function has returned.
     const auto points = std::make_shared<Points>(Points{PointMerger(part.points), {}});
     const auto add_point = [&xml, points] {
       if (xml.is("vertex"))
@@ -187,7 +374,7 @@ class ThreeMfReader {
     });
   }
 
-  /// Reads what a component and an item have in common: an object, and the transform of it.
+  /// Reads a component or an item: an object and its transform.
   Component read_component(XmlReader& xml, const std::string& model) {
     const std::optional<std::string_view> path = xml.attribute(path_attribute_);
     Component result;
@@ -197,16 +384,16 @@ class ThreeMfReader {
     return result;
   }
 
-  /// A name of a model as it is first seen, since names differ in capitals and in the slash in front.
+  /// Returns the name of a model without a leading slash.
   std::string model_named(XmlReader& xml, std::string path) {
     if (path.starts_with('/')) path.erase(0, 1);
     if (!archive_.has(path))
-      xml.fail("its archive has no file " + quoted_word(path) + ", to which it refers; the file is damaged");
+      xml.fail("its archive has no file ", quoted_word(path), ", to which it refers; the file is damaged");
     return path;
   }
 
-  /// A transform of twelve numbers, which multiplies rows from the right: three rows of the linear part, then
-  /// the translation.
+  /// Parses a transform of twelve numbers, which multiplies row vectors from the right: three rows of the
+  /// linear part, then the translation.
   static Placement placement_of(XmlReader& xml, std::string_view text) {
     Placement result;
     for (int row = 0; row < 4; ++row)
@@ -221,66 +408,62 @@ class ThreeMfReader {
     return result;
   }
 
-  /// A number of XML Schema, independent of the locale.
+  /// Parses a number of XML Schema, independent of the locale.
   static double number(XmlReader& xml, std::string_view text, const char* what) {
     std::string_view digits = trimmed(text);
-    // XML's numbers may have a plus in front, which the library refuses.
+    // XML Schema allows a plus sign, from_chars() does not.
     if (digits.starts_with('+') && !digits.starts_with("+-")) digits.remove_prefix(1);
     double value = 0.0;
     const auto [rest, error] = std::from_chars(digits.data(), digits.data() + digits.size(), value);
     if (error != std::errc() || rest != digits.data() + digits.size() || !std::isfinite(value))
-      xml.fail(std::string(what) + " has " + quoted_word(text) + ", which is not a finite number");
+      xml.fail(what, " has ", quoted_word(text), ", which is not a finite number");
     return value;
   }
 
   static double coordinate(XmlReader& xml, const char* axis) {
     const std::optional<std::string_view> text = xml.attribute(axis);
-    if (!text) xml.fail("a vertex without " + std::string(axis) + "; the file is damaged");
+    if (!text) xml.fail("a vertex without ", axis, "; the file is damaged");
     return number(xml, *text, axis);
   }
 
-  /// An attribute that is an index or the number of an object.
+  /// Parses an attribute that is an index or the number of an object.
   static std::uint32_t whole_number(XmlReader& xml, const char* key) {
     const std::optional<std::string_view> text = xml.attribute(key);
-    if (!text) xml.fail("the attribute " + std::string(key) + " is missing; the file is damaged");
+    if (!text) xml.fail("the attribute ", key, " is missing; the file is damaged");
     const std::string_view digits = trimmed(*text);
     std::uint32_t value = 0;
     const auto [rest, error] = std::from_chars(digits.data(), digits.data() + digits.size(), value);
     if (error != std::errc() || rest != digits.data() + digits.size())
-      xml.fail(std::string(key) + " is " + quoted_word(*text) +
-               ", which is no whole number that an index can be");
+      xml.fail(key, " is ", quoted_word(*text), ", which is no whole number that an index can be");
     return value;
   }
 
-  /// A corner of a triangle. The points stand before the triangles, so it is checked at once, with the line
-  /// at hand.
+  /// Parses a corner of a triangle. The points precede the triangles, so it can be checked at once.
   static std::uint32_t corner(XmlReader& xml, const char* key, const std::vector<std::uint32_t>& numbers) {
     const std::uint32_t value = whole_number(xml, key);
     if (value >= numbers.size())
-      xml.fail("a triangle refers to point " + std::to_string(value) + ", but there are " +
-               std::to_string(numbers.size()) + " (counting from 0)");
+      xml.fail("a triangle refers to point ", value, ", but there are ", numbers.size(),
+               " (counting from 0)");
     return numbers[value];
   }
 
   SceneObject& object(const ObjectKey& key) {
-    // Models beside the root are read when an object of theirs is asked for.
+    // Models other than the root are read when one of their objects is used.
     if (std::ranges::find(models_, key.first) == models_.end()) read_model(key.first, false);
     const auto found = objects_.find(key);
     if (found == objects_.end())
-      builder_.fail("it refers to the object " + std::to_string(key.second) +
-                    ", which it does not have; the file is damaged");
+      builder_.fail("it refers to the object ", key.second, ", which it does not have; the file is damaged");
     return found->second;
   }
 
-  /// Bytes of the object with all that it is composed of, each as often as it occurs. Sums in double
-  /// precision: ten levels of ten components each are no overflow.
+  /// Returns the bytes of the object with all its components, each as often as it occurs. In double
+  /// precision, since ten levels of ten components each overflow integers.
   double cost_of(const ObjectKey& key, int depth) {
     SceneObject& whole = object(key);
     double cost = kVisit + whole.part.cost();
     if (whole.cost >= 0.0) return whole.cost;
     for (const Component& component : whole.components) {
-      // On the way down for those that contain themselves, on the way up for those that were summed up
-      // before.
+      // The depth catches objects that contain themselves, the height those whose cost is known already.
       if (depth < kDeepestObject) cost += cost_of(component.object, depth + 1);
       whole.height = std::max(whole.height, 1 + object(component.object).height);
       if (depth >= kDeepestObject || whole.height > kDeepestObject)
@@ -290,7 +473,7 @@ class ThreeMfReader {
     return whole.cost = cost;
   }
 
-  /// Puts an object with all its components in its place. The recursion is no deeper than cost_of() allows.
+  /// Adds a copy of an object with all its components. The recursion is no deeper than cost_of() allows.
   void place(const Component& component, const Placement& outer) {
     const SceneObject& whole = object(component.object);
     const Placement placement = outer * component.placement;

@@ -1,106 +1,87 @@
-// ZIP archives as packages of documents use them, by libzip: members stored or deflated, in one file. Private
-// to algorithms/io.
+// ZIP archives as document packages use them, by minizip: members stored or deflated, the archive in memory.
+// Private to algorithms/io.
 #pragma once
 
-#include <zip.h>
-
 #include <cstdint>
-#include <exception>
-#include <functional>
+#include <map>
 #include <memory>
 #include <span>
 #include <string>
 #include <string_view>
-#include <vector>
 
 #include "algorithms/io/mesh_file_formats.h"
-#include "algorithms/io/scenes/scene_files.h"
 
 namespace hermesh::mesh_formats {
 
-/// An archive of the library's, which goes without being written.
-struct DiscardZip {
-  void operator()(zip_t* archive) const { zip_discard(archive); }
-};
-using Zip = std::unique_ptr<zip_t, DiscardZip>;
+/// Memory that minizip uses instead of a file, either to read `in` or to write `out`.
+struct ZipStream {
+  std::string_view in;
+  std::string out;
+  std::uint64_t at = 0;
 
-/// A member of an archive that is being unpacked from front to back. The archive must outlive it.
-class ZipMember {
+  std::uint64_t size() const { return in.size() + out.size(); }
+};
+
+/// Reads the members of an archive in memory, one after the other.
+class ZipArchive {
  public:
-  /// Unpacks the next bytes. @returns how many there are; 0 at the end, and then length and checksum are what
-  /// the directory says. @throws Error if they are not, or if the data do not unpack.
+  /// Reads the directory. The bytes must outlive the archive. @throws Error if the directory is missing or
+  /// damaged.
+  ZipArchive(std::string_view bytes, const MeshBuilder& builder);
+
+  /// True if there is a member of this name, in letters of either case, with or without a leading slash.
+  bool has(const std::string& name) const { return find(name) != nullptr; }
+  /// Begins to unpack a member; it replaces the one before. @throws Error if it does not exist, is encrypted
+  /// or packed by another method than deflate, if its length is impossible, or if check_unpacked() refuses
+  /// the members opened so far.
+  void open(const std::string& name);
+  /// Unpacks the next bytes and returns their number: 0 at the end, where length and checksum have been
+  /// compared with the directory. @throws Error if they differ, or if the data do not unpack.
   std::size_t read(std::span<char> room);
-  /// Length that the directory declares, and how much of it was read.
+  /// Length of the member as the directory declares it, and number of bytes read so far.
   std::uint64_t size() const { return size_; }
   std::uint64_t done() const { return done_; }
 
  private:
-  friend class ZipArchive;
-  struct Close {
-    void operator()(zip_file_t* file) const { zip_fclose(file); }
+  struct Entry {
+    std::uint64_t position, number;
   };
-  [[noreturn]] void fail(int code) const;
+  struct Close {
+    void operator()(void* archive) const;
+  };
+  const Entry* find(std::string name) const;
+  [[noreturn]] void fail(const std::string& what) const;
 
-  const MeshBuilder* builder_;
-  std::string shown_;  ///< the name, for sentences
-  std::unique_ptr<zip_file_t, Close> file_;
-  std::uint64_t size_ = 0, done_ = 0;
-};
-
-/// An archive in memory, whose bytes must outlive it.
-class ZipArchive {
- public:
-  /// @throws Error if the directory is missing or damaged.
-  ZipArchive(std::string_view bytes, const MeshBuilder& builder);
-
-  /// Whether there is a member of this name, in letters of either case, with or without a slash in front.
-  bool has(const std::string& name) const { return find(name) >= 0; }
-  /// Begins to unpack a member. @throws Error if there is none, if it is encrypted or packed by another
-  /// method than deflate, or if its length cannot be right or check_unpacked() refuses all that were opened.
-  ZipMember open(const std::string& name);
-
- private:
-  zip_int64_t find(std::string name) const;
-  void check(const zip_stat_t& entry, const std::string& shown);
-
-  std::uint64_t bytes_;       ///< of the whole file
-  std::uint64_t opened_ = 0;  ///< unpacked length of the members that were opened
   const MeshBuilder& builder_;
-  Zip archive_;
+  ZipStream stream_;
+  std::unique_ptr<void, Close> archive_;
+  std::map<std::string, Entry> entries_, lower_entries_;  ///< by name, and by name in small letters
+  std::string shown_;                                     ///< the name of the open member, for messages
+  bool is_open_ = false;
+  std::uint64_t opened_ = 0, size_ = 0, done_ = 0;  ///< opened_: unpacked bytes of all members opened
 };
 
-/// Whether the bytes begin as an archive does.
+/// True if the bytes begin with the header of a member, or with the end of an empty archive.
 bool begins_like_zip(std::string_view bytes);
 
-/// Packs members into an archive whose times are all the earliest that ZIP can say, so that the same members
-/// give the same bytes.
+/// Packs members into an archive whose times are all 1 January 1980, the earliest that ZIP has, so that the
+/// same members give the same bytes.
 class ZipWriter {
  public:
-  /// Gives the bytes of a member piece by piece, each of which stays until the next call; an empty one at the
-  /// end.
-  using Pieces = std::function<std::string_view()>;
-
-  /// Adds a member of so many bytes, which are asked for when the archive is written.
-  void add(std::string name, std::uint64_t size, Pieces pieces);
-  void add(std::string name, std::string bytes);
-  /// Packs the members in their order, and hands the archive to `out`. It waits in memory, since each
-  /// member's lengths come before it. @throws Error where there is none of that, and whatever the members
-  /// throw.
-  void write(const ByteSink& out);
+  ZipWriter();
+  /// Begins the next member. `at_most` bounds its length: from 4 GiB on, its lengths take 64 bits, which not
+  /// every reader knows.
+  void begin(const std::string& name, double at_most);
+  void write(std::string_view bytes);
+  /// Returns the archive. It is built in memory, since the lengths of a member precede its data.
+  std::string finish();
 
  private:
-  struct Member {
-    std::string name;
-    std::uint64_t size;
-    Pieces pieces;
-    std::string_view rest = {};  ///< of the piece that was given last
-    std::exception_ptr thrown = {};
+  struct Close {
+    void operator()(void* archive) const;
   };
-  static zip_int64_t answer(void* member, void* data, zip_uint64_t size, zip_source_cmd_t command);
-  static zip_int64_t give(Member& member, char* room, std::uint64_t size);
-  void pack(zip_source_t* target);
-
-  std::vector<Member> members_;
+  ZipStream stream_;
+  std::unique_ptr<void, Close> archive_;
 };
 
 }  // namespace hermesh::mesh_formats

@@ -1,4 +1,4 @@
-// Bits of words of 64, and lists of the set bits of a leaf's eight words; for kernels alone, as vectors.h is.
+// Bits of words of 64, and lists of the set bits of a leaf's eight words; only for kernels, as vectors.h.
 #pragma once
 
 #include "algorithms/lattice/simd/vectors.h"
@@ -15,7 +15,7 @@ constexpr std::uint64_t kFirstY = 0xff, kLastY = kFirstY << 56;
 typedef std::uint8_t EightBytes __attribute__((vector_size(8)));
 typedef std::uint16_t EightShorts __attribute__((vector_size(16)));
 
-/// The places of the set bits of a byte.
+/// The positions of the set bits of a byte.
 struct BitsOfByte {
   std::uint8_t place[256][8], count[256];
 };
@@ -28,10 +28,10 @@ constexpr BitsOfByte make_bits_of_byte() {
 }
 alignas(64) constexpr BitsOfByte kBitsOfByte = make_bits_of_byte();
 
-/// Room of a list beyond its last number, whose content is undefined.
+/// Room of a list after its last number, undefined.
 constexpr int kListRoom = 32;
 
-/// Which bytes of eight words are not zero: bit 8x + y for byte y of word x.
+/// Returns which bytes of eight words are not zero: bit 8x + y for byte y of word x.
 inline std::uint64_t bytes_with_bits(const std::uint64_t* words) {
   std::uint64_t result = 0;
   for (int i = 0; i < 4; ++i) {
@@ -42,13 +42,13 @@ inline std::uint64_t bytes_with_bits(const std::uint64_t* words) {
   return result;
 }
 
-/// Bits of the last layer along y of eight words, as bits 8x + z.
+/// Returns the bits of the last layer along y of eight words, as bits 8x + z.
 inline std::uint64_t last_along_y(const std::uint64_t* words) {
   std::uint64_t plane = 0;
   for (int x = 0; x < 8; ++x) plane |= words[x] >> 56 << (8 * x);
   return plane;
 }
-/// Bits of the last layer along z of eight words, as bits 8x + y.
+/// Returns the bits of the last layer along z of eight words, as bits 8x + y.
 inline std::uint64_t last_along_z(const std::uint64_t* words) {
   std::uint64_t plane = 0;
   for (int i = 0; i < 4; ++i) {
@@ -57,7 +57,7 @@ inline std::uint64_t last_along_z(const std::uint64_t* words) {
   }
   return plane;
 }
-/// Repeats the last number of a list for a vector beyond it, so that whole vectors can be read.
+/// Repeats the last number of a list for a vector after it, so that whole vectors can be read.
 inline void pad_list(std::uint16_t* list, int count) {
   for (int i = 0; i < kLanes; ++i) list[count + i] = count > 0 ? list[count - 1] : std::uint16_t{0};
 }

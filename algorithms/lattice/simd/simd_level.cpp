@@ -7,21 +7,20 @@
 namespace hermesh {
 namespace {
 
-// In ascending order: the last level that is available is the best.
+// In ascending order.
 constexpr SimdLevel kAll[] = {SimdLevel::sse2, SimdLevel::avx2, SimdLevel::avx512};
 
 bool is_available(SimdLevel level) {
   switch (level) {
-    // GCC's builtin also asks whether the operating system saves the wide registers.
+    // GCC's builtin also checks that the operating system saves the wide registers.
     case SimdLevel::avx2:
       return __builtin_cpu_supports("avx2") != 0;
     case SimdLevel::avx512:
-      // All five extensions that sources of this level are compiled for, VBMI2 for lists of set bits
-      // (bit_numbers.inc).
+      // All five extensions that sources of this level are compiled for.
       return __builtin_cpu_supports("avx512f") != 0 && __builtin_cpu_supports("avx512bw") != 0 &&
              __builtin_cpu_supports("avx512dq") != 0 && __builtin_cpu_supports("avx512vl") != 0 &&
              __builtin_cpu_supports("avx512vbmi2") != 0;
-    // What every source file is compiled for needs no question.
+    // Every source file is compiled for it.
     case SimdLevel::sse2:
       break;
   }
@@ -38,7 +37,6 @@ std::string names_of_available() {
 }  // namespace
 
 std::string_view name(SimdLevel level) {
-  // In the order of the enumeration.
   constexpr std::string_view kNames[] = {"sse2", "avx2", "avx512"};
   return kNames[static_cast<int>(level)];
 }
@@ -53,8 +51,7 @@ std::vector<SimdLevel> available_simd_levels() {
 SimdLevel parse_simd_level(std::string_view text) {
   for (const SimdLevel level : kAll) {
     if (name(level) != text) continue;
-    // Refused and not replaced by the next lower one: who forces a level (a test, a measurement) must not get
-    // another.
+    // Not replaced by a lower one: a test or measurement that forces a level must not get another.
     if (!is_available(level))
       throw Error("HERMESH_SIMD=" + std::string(text) +
                   " asks for vector code that this machine cannot run; it has " + names_of_available() + ".");
@@ -65,8 +62,7 @@ SimdLevel parse_simd_level(std::string_view text) {
 }
 
 SimdLevel chosen_simd_level() {
-  // Read at every call and kept nowhere, so that tests can go through all levels in one
-  // process. Empty counts as not set.
+  // Read at every call, so that tests can set all levels in one process. Empty counts as not set.
   const char* text = std::getenv("HERMESH_SIMD");
   if (text && *text) return parse_simd_level(text);
   return is_available(SimdLevel::avx512) ? SimdLevel::avx512

@@ -15,12 +15,12 @@
 #include "algorithms/voxelization/inside/winding_kernels.h"
 
 namespace hermesh {
-namespace {
+namespace simd_level_test {
 
 template <class... Kernels>
 struct Families {
   static constexpr int kCount = sizeof...(Kernels);
-  /// `level` is what the compiler was told when it compiled the kernels.
+  /// `level` is the SIMD level for which the kernels were compiled.
   static void expect(SimdLevel level) {
     const bool chosen[] = {(chosen_kernels<Kernels>().level == level)...};
     for (int i = 0; i < kCount; ++i) EXPECT_TRUE(chosen[i]) << "family " << i << " at " << name(level);
@@ -42,5 +42,5 @@ TEST(SimdLevel, EveryFamilyOfKernelsIsOfTheLevelThatIsAskedFor) {
 
 TEST(SimdLevel, WhatIsNoLevelIsRefused) { EXPECT_THROW(parse_simd_level("mmx"), Error); }
 
-}  // namespace
+}  // namespace simd_level_test
 }  // namespace hermesh

@@ -1,15 +1,15 @@
-// Several numbers at once, in registers as wide as the level that a source is compiled for has, and fixed
-// numbers of them in as many registers as it takes. The compiler's own vector types: operators are
-// elementwise, a comparison gives −1 or 0 in each lane, and `mask ? a : b` chooses lane by lane. What these
-// types lack is here.
+// Several numbers at once, in registers as wide as the SIMD level of a source, and fixed numbers of them in
+// as many registers as necessary. The compiler's own vector types: operators are elementwise, a comparison
+// gives −1 or 0 in each lane, and `mask ? a : b` selects lane by lane. This header has the missing
+// operations.
 //
-// For kernels alone, which are compiled once a level (see simd_level.h). Nothing here has external linkage,
-// for what two levels share the linker may take from either; so kernels call none of the standard library's
-// functions, either. Every operation is elementwise and rounded once, as IEEE 754 says, so all levels give
-// the same bytes.
+// Only for kernels, which are compiled once per level (see simd_level.h). Nothing here has external linkage,
+// because the linker may take code shared by two levels from either; kernels do not call the standard library
+// for the same reason. Every operation is elementwise and rounded once, as IEEE 754 specifies, so all levels
+// give the same bytes.
 //
-// With AVX-512, too, vectors are of eight floats, but where HERMESH_WIDEST_VECTORS is defined: of the few
-// dozen edges of a single leaf along an axis sixteen lanes would leave more idle than they gain.
+// Also with AVX-512, vectors are of eight floats, unless HERMESH_WIDEST_VECTORS is defined: of the few dozen
+// edges of a single leaf along an axis sixteen lanes would leave more idle than they gain.
 #pragma once
 
 #include <immintrin.h>
@@ -25,7 +25,7 @@
 namespace hermesh::simd {
 namespace {
 
-/// What the compiler has been told, whatever the source is said to be.
+/// The level that the compiler was given.
 #if defined(__AVX512F__)
 constexpr SimdLevel kLevel = SimdLevel::avx512;
 #elif defined(__AVX2__)
@@ -82,14 +82,14 @@ inline Floats magnitude(Floats x) { return (Floats)((Ints)x & 0x7fffffff); }
 /// x where the mask is −1, else 0.
 inline Floats kept(Ints mask, Floats x) { return (Floats)((Ints)x & mask); }
 
-/// Two numbers from each place.
+/// Loads two numbers from each address.
 inline __m128 two_pairs(const float* first, const float* second) {
   const __m128i low = _mm_loadl_epi64(reinterpret_cast<const __m128i*>(first));
   return _mm_loadh_pi(_mm_castsi128_ps(low), reinterpret_cast<const __m64*>(second));
 }
 
-// Of each width: smaller and larger are b where either is no number, as the machine has them; less gives a
-// bit a lane; kept_unless_negative() x where `test` is not below 0, and 0 where it is.
+// Of each width: smaller and larger are b if either is NaN, as in hardware; less gives a bit per lane;
+// kept_unless_negative() is x if `test` is not below 0, else 0.
 #if defined(HERMESH_SIXTEEN_LANES)
 constexpr Ints kLaneBits{1, 2, 4, 8, 16, 32, 64, 128, 256, 512, 1024, 2048, 4096, 8192, 16384, 32768};
 inline Floats smaller(Floats a, Floats b) { return (Floats)_mm512_min_ps((__m512)a, (__m512)b); }
@@ -197,11 +197,11 @@ inline Ints gather(const int* base, Ints index) {
 }
 #endif
 
-/// −1 in the lanes whose bits are set.
+/// Returns −1 in the lanes whose bits are set.
 inline Ints mask_of(unsigned bits) { return (all(int(bits)) & kLaneBits) == kLaneBits; }
 
-/// Rows of eight floats, their first samples `stride` apart: as many as a vector holds, or a vector's worth
-/// of one.
+/// Rows of eight floats, their first samples `stride` apart: as many as a vector holds, or a vector's part of
+/// one.
 constexpr int kRows = kLanes < 8 ? 1 : kLanes / 8;
 inline Floats load_rows(const float* first, std::size_t stride) {
 #if defined(HERMESH_SIXTEEN_LANES)
@@ -242,7 +242,7 @@ struct Rows4 {
     }
   }
 
-  /// All rows, in the order in which a transposition within each 16 bytes leaves them.
+  /// Stores all rows, in the order in which a transposition within each 16 bytes leaves them.
   void store_transposed(float* out) const {
     Rows4 rows = *this;
     rows.transpose();
@@ -260,7 +260,7 @@ struct Rows4 {
   void store_row(char* at, int i) const {
     __builtin_memcpy(at, reinterpret_cast<const char*>(&column[i & 3]) + 16 * (i >> 2), 16);
   }
-  /// Within each 16 bytes: what were rows become columns and back. Row i lies in vector i mod 4.
+  /// Transposes within each 16 bytes. Row i lies in vector i mod 4.
   void transpose() {
     const Floats a = low_pairs(column[0], column[1]), b = high_pairs(column[0], column[1]);
     const Floats c = low_pairs(column[2], column[3]), d = high_pairs(column[2], column[3]);
@@ -361,7 +361,7 @@ inline Floats16 kept_unless_negative(Floats16 test, Floats16 x) {
   for (int i = 0; i < Floats16::kRegisters; ++i) x.r[i] = kept_unless_negative(test.r[i], x.r[i]);
   return x;
 }
-/// Lane i of `set` where bit i is set, of `clear` where it is not.
+/// Returns lane i of `set` where bit i is set, otherwise of `clear`.
 inline Floats16 choose(unsigned bits, Floats16 set, Floats16 clear) {
   for (int i = 0; i < Floats16::kRegisters; ++i)
     clear.r[i] = mask_of(bits >> (kLanes * i)) ? set.r[i] : clear.r[i];

@@ -15,7 +15,7 @@
 #include "algorithms/hermite/samplers.h"
 
 namespace hermesh {
-namespace {
+namespace adaptive_dual_contouring_test {
 
 using Eigen::Vector3d;
 using Placement = AdaptiveOptions::Placement;
@@ -65,7 +65,7 @@ std::multiset<std::vector<std::uint32_t>> polygons(const PolygonMesh& mesh) {
   return result;
 }
 
-/// Whether as many polygons run along each edge in one direction as in the other.
+/// Returns true if along each edge as many polygons run in one direction as in the other.
 bool is_closed_and_oriented(const PolygonMesh& mesh) {
   std::map<std::pair<std::uint32_t, std::uint32_t>, int> sum;
   for (const auto& polygon : polygons(mesh))
@@ -297,7 +297,7 @@ Vector3d middle_of(const PolygonMesh& mesh, const std::vector<std::uint32_t>& po
   return sum / double(polygon.size());
 }
 
-/// The polygons near a place, as their corners' positions.
+/// The polygons near a point, as the positions of their vertices.
 std::multiset<std::vector<float>> near(const PolygonMesh& mesh, const Vector3d& centre, double radius) {
   std::multiset<std::vector<float>> result;
   for (const auto& polygon : polygons(mesh)) {
@@ -379,5 +379,5 @@ TEST(AdaptivityScale, MultipliesTheThreshold) {
   EXPECT_THROW(scaled(NAN), Error);
 }
 
-}  // namespace
+}  // namespace adaptive_dual_contouring_test
 }  // namespace hermesh

@@ -5,8 +5,8 @@
 #include <vector>
 
 #include "algorithms/core/parallel.h"
-#include "algorithms/hermite/dense/dense_tree.h"
-#include "algorithms/hermite/dense/thesis_voxel.h"
+#include "algorithms/thesis/voxels/dense_tree.h"
+#include "algorithms/thesis/voxels/voxels.h"
 
 namespace hermesh {
 namespace {
@@ -17,7 +17,7 @@ using Leaf = ThesisDenseTree::LeafNodeType;
 Lower lower_of(const openvdb::Coord& at) { return {at.x(), at.y(), at.z()}; }
 openvdb::Coord coord_of(const Lower& at) { return {at[0], at[1], at[2]}; }
 
-/// The tagged edges of a leaf, by axis.
+/// Returns the tagged edges of a leaf, by axis.
 std::array<BlockMask, 3> tagged_edges(const ThesisVoxel* voxels) {
   std::array<BlockMask, 3> tags{};
   for (int sample = 0; sample < 512; ++sample)
@@ -26,26 +26,10 @@ std::array<BlockMask, 3> tagged_edges(const ThesisVoxel* voxels) {
   return tags;
 }
 
-/// Adds the places of the blocks that hold a cell around a tagged edge: the leaf's own, and where the edge
-/// lies in a first layer the one below along each axis that is not the edge's.
-void add_blocks_around(const Lower& lower, const std::array<BlockMask, 3>& tags, std::vector<Lower>& out) {
-  for (int axis = 0; axis < 3; ++axis)
-    for (int down = 1; down < 8; ++down) {
-      if (down >> axis & 1) continue;  // the cells around an edge begin where it does along its own axis
-      const std::uint64_t bits = first_layers(down & 2, down & 4);
-      bool touches = false;
-      for (int x = 0; x < (down & 1 ? 1 : 8); ++x) touches |= (tags[axis][x] & bits) != 0;
-      if (touches)
-        out.push_back(
-            {lower[0] - 8 * (down & 1), lower[1] - 8 * (down >> 1 & 1), lower[2] - 8 * (down >> 2)});
-    }
-}
-
 }  // namespace
 
 std::array<SignLattice::Part, 8> SparseEdges::signs(std::int32_t number) const {
-  // A block that is not there owns no crossing edge: none of its edges changes the sign, so all its samples
-  // have that of the sample before them.
+  // A missing block owns no crossing edge, so all its samples have the sign of the sample before them.
   const HermiteView::Block& block = blocks()[number];
   std::array<SignLattice::Part, 8> parts;
   std::array<std::int32_t, 8> leaf;
@@ -56,8 +40,8 @@ std::array<SignLattice::Part, 8> SparseEdges::signs(std::int32_t number) const {
       parts[part].inside = &blocks()[there].inside;
       continue;
     }
-    // One step down from the part, along the lowest of its axes; that part has been looked at already, and
-    // part 0 is there.
+    // One step down from the part, along the lowest of its axes; that part precedes this one, and part 0
+    // exists.
     const int before = part & (part - 1), axis = part & 1 ? 2 : part & 2 ? 1 : 0;
     parts[part].uniform = leaf[before] >= 0      ? hermite_.leaves[leaf[before]].beyond[axis] & 1
                           : parts[before].inside ? (*parts[before].inside)[0] & 1
@@ -68,8 +52,7 @@ std::array<SignLattice::Part, 8> SparseEdges::signs(std::int32_t number) const {
 
 void SparseEdges::read(std::int32_t number, int axis, const BlockMask& wanted, EdgeCrossing* out) const {
   const HermiteView::Block& block = blocks()[number];
-  // Crossings are stored by axis and then by sample, so that those that are wanted are found by counting
-  // bits.
+  // Crossings are stored by axis and then by sample, so the wanted ones are found by counting bits.
   const EdgeCrossing* next =
       hermite_.crossings.data() + hermite_.leaves[block.leaf].first + block.before[axis][0];
   for (int x = 0; x < 8; ++x) {
@@ -84,17 +67,18 @@ void SparseEdges::read(std::int32_t number, int axis, const BlockMask& wanted, E
 }
 
 PackedEdges::PackedEdges(ThesisDense hermite, RunContext& context) : hermite_(std::move(hermite)) {
-  // OpenVDB hands leaves out in the order of its nodes; blocks ascend by their places.
+  // Blocks ascend by their positions.
   std::vector<const Leaf*> leaves;
-  hermite_.tree->grid->tree().getNodes(leaves);
+  hermite_.grid->tree().getNodes(leaves);
   std::ranges::sort(leaves, {}, [](const Leaf* leaf) { return lower_of(leaf->origin()); });
-  // Every leaf is a block, whether it has a tagged edge or not, so that what is no block has one sign.
+  // Every leaf is a block, with or without a tagged edge, so that missing blocks have one sign.
   std::vector<Lower> places, around;
   for (const Leaf* leaf : leaves) {
     places.push_back(lower_of(leaf->origin()));
-    add_blocks_around(places.back(), tagged_edges(leaf->buffer().data()), around);
+    const unsigned wanted = blocks_below(tagged_edges(leaf->buffer().data()));
+    for (int down = 1; down < 7; ++down)
+      if (wanted >> down & 1) around.push_back(block_below(places.back(), down));
   }
-  // Several leaves may ask for one block; sorted, its doubles lie side by side.
   places.insert(places.end(), around.begin(), around.end());
   std::ranges::sort(places);
   places.erase(std::unique(places.begin(), places.end()), places.end());
@@ -110,7 +94,7 @@ PackedEdges::PackedEdges(ThesisDense hermite, RunContext& context) : hermite_(st
     block.leaf = found ? static_cast<std::int32_t>(at - leaves.begin()) : -1;
     voxels_[b] = found ? (*at)->buffer().data() : nullptr;
     if (!found) {
-      // No sample of it owns a tagged edge, and all have one sign.
+      // Without tagged edges and of one sign.
       block.inside = sign_without_block(block.lower) ? kAllInside : kAllOutside;
       return;
     }
@@ -125,7 +109,7 @@ PackedEdges::PackedEdges(ThesisDense hermite, RunContext& context) : hermite_(st
 
 bool PackedEdges::sign_without_block(const Lower& lower) const {
   // A tile or the background.
-  return hermite_.tree->grid->tree().getValue(coord_of(lower)).inside();
+  return hermite_.grid->tree().getValue(coord_of(lower)).inside();
 }
 
 std::array<SignLattice::Part, 8> PackedEdges::signs(std::int32_t number) const {
@@ -152,7 +136,7 @@ void PackedEdges::count_edges(RunContext& context) {
   parallel_blocks(blocks_.size(), context, [&](std::size_t b) {
     const HermiteView::Block& block = blocks_[b];
     const std::array<SignLattice::Part, 8> parts = signs(static_cast<std::int32_t>(b));
-    // A leaf as SparseHermite keeps it says which edges change their sign.
+    // A leaf of SparseHermite determines which edges change their sign.
     SignLeaf leaf{block.lower, 0, block.inside, {}};
     constexpr int kPart[3] = {4, 2, 1};  // the neighbour one block up the axis
     for (int axis = 0; axis < 3; ++axis) {
@@ -170,7 +154,6 @@ void PackedEdges::count_edges(RunContext& context) {
         missing += static_cast<std::size_t>(std::popcount(change & ~tags));
         more += static_cast<std::size_t>(std::popcount(tags & ~change));
       }
-    // Sums do not depend on the order of threads.
     tagged += all, lost += missing, needless += more;
   });
   tagged_ = tagged, lost_ = lost, needless_ = needless;

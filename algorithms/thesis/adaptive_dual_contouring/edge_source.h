@@ -1,32 +1,31 @@
 // Hermite data as chapter 6 reads them: signs at samples, and edges that are "tagged with data".
 //
-// Two forms have this. Of ours (FloatHermite) the tagged edges are those whose ends differ in sign. Of the
-// thesis's 10 bytes (ThesisDense) they are those whose voxel says so, which §4.2 reads off the normal's code:
-// it misses some whose ends differ in sign (trap T2), and after eq. 7.1 it has some whose ends do not (trap
-// T11).
+// In FloatHermite the tagged edges are those whose ends differ in sign. In the thesis's 10 bytes
+// (ThesisDense) they are given by their voxel, which §4.2 reads off the normal's code: it misses some whose
+// ends differ in sign (trap T2), and after eq. 7.1 it has some whose ends do not (trap T11).
 #pragma once
 
 #include <array>
 #include <cstdint>
 
-#include "algorithms/hermite/dense/dense_hermite.h"
 #include "algorithms/hermite/hermite_view.h"
 #include "algorithms/thesis/adaptive_dual_contouring/region_topology.h"
+#include "algorithms/thesis/voxels/dense_hermite.h"
 
 namespace hermesh {
 
-/// Blocks of 8³ samples with their signs and tagged edges. Any thread may ask.
+/// Blocks of 8³ samples with their signs and tagged edges, for any thread.
 class EdgeSource {
  public:
   virtual ~EdgeSource() = default;
   EdgeSource(const EdgeSource&) = delete;
   EdgeSource& operator=(const EdgeSource&) = delete;
 
-  /// Blocks in ascending order with their neighbours: one for each cell around a tagged edge, and for its
-  /// owner. All of a block is set; `crossing` are the tagged edges that it owns, and a block without a leaf
-  /// owns none.
+  /// Returns the blocks in ascending order with their neighbours: one for each cell around a tagged edge, and
+  /// for its owner. All of a block is set; `crossing` are the tagged edges that it owns, and a block without
+  /// a leaf owns none.
   virtual const HermiteView::Blocks& blocks() const = 0;
-  /// The signs of a block and of its upper neighbours, there or not: parts 4x + 2y + z.
+  /// Returns the signs of a block and of its upper neighbours, existing or not: parts 4x + 2y + z.
   virtual std::array<SignLattice::Part, 8> signs(std::int32_t block) const = 0;
   /// Writes the data of the block's edges along an axis that are in `wanted`, which must be tagged, in the
   /// order of their samples.
@@ -36,7 +35,7 @@ class EdgeSource {
   EdgeSource() = default;
 };
 
-/// The edges of sparse data, which must outlive it.
+/// The edges of sparse data, which must outlive this object.
 class SparseEdges : public EdgeSource {
  public:
   /// @throws Cancelled.
@@ -52,7 +51,7 @@ class SparseEdges : public EdgeSource {
   const decltype(view_of(std::declval<const FloatHermite&>(), std::declval<RunContext&>())) view_;
 };
 
-/// The edges of the thesis's voxels, which stay packed: what is read is unpacked edge by edge.
+/// The edges of the thesis's voxels, which are unpacked edge by edge when they are read.
 class PackedEdges : public EdgeSource {
  public:
   /// @throws Cancelled.
@@ -63,7 +62,7 @@ class PackedEdges : public EdgeSource {
   void read(std::int32_t block, int axis, const BlockMask& wanted, EdgeCrossing* out) const override;
 
   std::size_t tagged() const { return tagged_; }  ///< number of edges tagged with data
-  /// Number of edges whose ends differ in sign and that are not tagged: no polygon is made around them.
+  /// Number of edges whose ends differ in sign and that are not tagged: they get no polygon.
   std::size_t lost() const { return lost_; }
   /// Number of edges that are tagged although their ends have one sign.
   std::size_t needless() const { return needless_; }

@@ -7,18 +7,18 @@
 #include <map>
 #include <random>
 
-#include "algorithms/hermite/dense/dense_combine.h"
 #include "algorithms/hermite/samplers.h"
 #include "algorithms/thesis/adaptive_dual_contouring/adaptive_dual_contouring.h"
+#include "algorithms/thesis/voxels/dense_hermite.h"
 
 namespace hermesh {
-namespace {
+namespace edge_source_test {
 
 using Eigen::Vector3d;
 
 class EdgeSourceTest : public testing::Test {
  protected:
-  /// A box about a place, turned about y.
+  /// A box about a point, rotated about y.
   FloatHermite box(const Vector3d& centre, const Vector3d& half, double degrees) {
     const double angle = degrees * 3.14159265358979 / 180.0;
     const Eigen::Matrix3d turn = Eigen::AngleAxisd(angle, Vector3d::UnitY()).toRotationMatrix();
@@ -149,5 +149,5 @@ TEST_F(EdgeSourceTest, SameBytesAtAnyNumberOfThreads) {
 
 TEST_F(EdgeSourceTest, NoDataMakeNoMesh) { EXPECT_TRUE(mesh(packed(FloatHermite{}), 0.1).empty()); }
 
-}  // namespace
+}  // namespace edge_source_test
 }  // namespace hermesh

@@ -2,20 +2,21 @@
 
 #include "algorithms/lattice/simd/vectors.h"
 
-// Plain loops over lanes, compiled as those of winding_kernels.cpp are; every lane's operations are the same
-// at all levels, and so are its bytes.
+// Plain loops over lanes, compiled as those of winding_kernels.cpp; every lane's operations are the same at
+// all levels, and so are its bytes.
 namespace hermesh::qef_kernels {
 namespace HERMESH_SIMD_LEVEL {
 namespace {
 
 inline float larger(float a, float b) { return a < b ? b : a; }
 
-/// Jacobi's rotation in the plane of the axes p and q, which makes their common entry 0; r is the third axis.
+/// Applies Jacobi's rotation in the plane of the axes p and q, which makes their common entry 0; r is the
+/// third axis.
 [[gnu::always_inline]] inline void rotate(EigenLanes& m, int p, int q, int r) {
   constexpr float kTiny = 1e-30f;
   for (int i = 0; i < kLanes; ++i) {
     const float d = m.diagonal[q][i] - m.diagonal[p][i], e = 2.0f * m.off[r][i];
-    // The tangent of the smaller of the two angles that do it; with kTiny a matrix that is 0 stays as it is.
+    // The tangent of the smaller of the two possible angles; with kTiny a matrix of zeros is unchanged.
     const float t =
         __builtin_copysignf(1.0f, d) * e / (__builtin_fabsf(d) + __builtin_sqrtf(d * d + e * e) + kTiny);
     const float c = 1.0f / __builtin_sqrtf(1.0f + t * t), s = t * c;
@@ -33,13 +34,13 @@ inline float larger(float a, float b) { return a < b ? b : a; }
   }
 }
 
-/// Eigenvalues of AᵀA, which are the squares of A's singular values, and their eigenvectors: for a symmetric
-/// matrix of three rows this takes the place of the singular value decomposition of A (eq. 6.4).
+/// Computes the eigenvalues of AᵀA, which are the squares of A's singular values, and their eigenvectors: for
+/// a symmetric 3×3 matrix this replaces the singular value decomposition of A (eq. 6.4).
 [[gnu::always_inline]] inline void decompose(EigenLanes& m) {
   for (int k = 0; k < 3; ++k)
     for (int a = 0; a < 3; ++a)
       for (int i = 0; i < kLanes; ++i) m.vectors[k][a][i] = k == a ? 1.0f : 0.0f;
-  constexpr int kSweeps = 3;  // a test holds what they leave against a solver in double precision
+  constexpr int kSweeps = 3;  // a test compares the remainder with a solver in double precision
   for (int sweep = 0; sweep < kSweeps; ++sweep) {
     rotate(m, 0, 1, 2);
     rotate(m, 0, 2, 1);
@@ -49,7 +50,7 @@ inline float larger(float a, float b) { return a < b ? b : a; }
 
 void solve(EigenLanes& m, float truncation, const Lanes (&slopes)[3], Lanes (&step)[3]) {
   decompose(m);
-  // Squares of singular values are compared, so the share is squared, too.
+  // Squares of singular values are compared.
   const float share = truncation * truncation;
   for (int i = 0; i < kLanes; ++i) {
     const float largest = larger(m.diagonal[0][i], larger(m.diagonal[1][i], m.diagonal[2][i]));

@@ -1,4 +1,4 @@
-// The minimisers of quadratic error functions, several at a time.
+// The minimisers of several quadratic error functions at a time.
 #pragma once
 
 #include "algorithms/lattice/simd/simd_level.h"
@@ -10,8 +10,8 @@ namespace hermesh::qef_kernels {
 constexpr int kLanes = 16;
 using Lanes = float[kLanes];
 
-/// Symmetric 3×3 matrices with their eigenvectors, one a lane. Normals of unit length make entries of single
-/// precision good enough: what is truncated is a thousand times as large as their error.
+/// Symmetric 3×3 matrices with their eigenvectors, one per lane. With normals of unit length single precision
+/// suffices: the truncated entries are a thousand times as large as the error.
 struct EigenLanes {
   alignas(64) Lanes diagonal[3], off[3];  ///< off[i] is the entry of the two axes other than i
   alignas(64) Lanes vectors[3][3];        ///< by eigenvalue, by coordinate
@@ -20,7 +20,7 @@ struct EigenLanes {
 /// See simd_level.h.
 struct Kernels {
   SimdLevel level;
-  /// The steps from the mass points, by the singular values that are kept; `m` is used up.
+  /// Computes the steps from the mass points, by the retained singular values; `m` is overwritten.
   void (*solve)(EigenLanes& m, float truncation, const Lanes (&slopes)[3], Lanes (&step)[3]);
   static const Kernels sse2, avx2, avx512;
 };

@@ -11,8 +11,8 @@ using qef_kernels::EigenLanes, qef_kernels::kLanes, qef_kernels::Lanes;
 
 namespace {
 
-/// Writes a sum's matrix AᵀA, of which `value` gives the upper triangle row by row, into one lane. `off[i]`
-/// is the entry that row and column i have no part in.
+/// Writes a sum's matrix AᵀA, whose upper triangle `value` returns row by row, into one lane. `off[i]` is the
+/// entry outside row and column i.
 void load(EigenLanes& m, int lane, const QefSum& sum) {
   constexpr int kDiagonal[3] = {0, 3, 5}, kOff[3] = {4, 2, 1};
   for (int i = 0; i < 3; ++i) {
@@ -21,17 +21,17 @@ void load(EigenLanes& m, int lane, const QefSum& sum) {
   }
 }
 
-/// The vector Aᵀ(b − A x): half of how steeply E falls at x.
+/// Returns the vector Aᵀ(b − A x): half of the negative gradient of E at x.
 Eigen::Vector3d slope(const QefSum& sum, const Eigen::Vector3d& x) {
   const auto v = [&](int i) { return sum.value(i); };
   return {v(6) - (v(0) * x[0] + v(1) * x[1] + v(2) * x[2]), v(7) - (v(1) * x[0] + v(3) * x[1] + v(4) * x[2]),
           v(8) - (v(2) * x[0] + v(4) * x[1] + v(5) * x[2])};
 }
 
-/// Least truncation that the kernels can do: squares of the shares are compared in single precision.
+/// Least truncation of the kernels, which compare squares of the shares in single precision.
 constexpr double kLeastInSingle = 0.001;
 
-/// The minimiser nearest to `start` as the kernels find it, by a solver of double precision.
+/// Returns the minimiser nearest to `start`, by a solver of double precision.
 Eigen::Vector3d minimiser_in_double(const QefSum& sum, const Eigen::Vector3d& start, double truncation) {
   const auto v = [&](int i) { return sum.value(i); };
   Eigen::Matrix3d ata;
@@ -67,7 +67,6 @@ void minimisers(std::span<const QefSum* const> sums, std::span<const Eigen::Vect
   }
   const auto& kernels = chosen_kernels<qef_kernels::Kernels>();
   EigenLanes m;
-  // A lane is a sum; all of them are minimised at once.
   alignas(64) Lanes slopes[3], step[3];
   for (std::size_t first = 0; first < sums.size(); first += kLanes) {
     const int n = static_cast<int>(std::min<std::size_t>(kLanes, sums.size() - first));
@@ -76,7 +75,7 @@ void minimisers(std::span<const QefSum* const> sums, std::span<const Eigen::Vect
       const std::size_t at = first + static_cast<std::size_t>(std::min(i, n - 1));
       load(m, i, *sums[at]);
       // From the start, in double precision, so that only the step is a single one, and a direction without a
-      // singular value stays as it is there: the pseudo-inverse of §6.2.1 about the start as origin.
+      // singular value is unchanged: the pseudo-inverse of §6.2.1 about the start as origin.
       const Eigen::Vector3d fall = slope(*sums[at], start(at));
       for (int a = 0; a < 3; ++a) slopes[a][i] = static_cast<float>(fall[a]);
     }

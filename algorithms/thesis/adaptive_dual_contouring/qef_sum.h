@@ -8,14 +8,14 @@ namespace hermesh {
 
 /// E(x) = Σ (nᵢ·(x − pᵢ))² as the sums of eq. 6.3, so that the function of a region is the sum of those of
 /// its cells. All summands must share one frame, with its origin nearby: a block's middle, in voxels. (No
-/// initialiser: a block has room for 512 and uses few. Pairs, because that is what the vector units of every
-/// machine add at once; Eigen's would go by way of the memory.)
+/// initialiser: a block has room for 512 and uses few. The sums are stored in pairs because the vector units
+/// of every machine add two numbers at once; Eigen's types would go through memory.)
 struct QefSum {
   using Pair = double __attribute__((vector_size(16)));
   /// The entries AᵀA (xx, xy, xz, yy, yz, zz), Aᵀb (x, y, z), bᵀb, Σp (x, y, z), number of planes.
   Pair pairs[7];
 
-  /// The function of one crossing: its point in the shared frame, its normal of unit length.
+  /// Returns the function of one crossing: its point in the shared frame, its normal of unit length.
   static QefSum of_plane(const float (&point)[3], const float (&normal)[3]) {
     const double x = normal[0], y = normal[1], z = normal[2];
     const double d = x * point[0] + y * point[1] + z * point[2];
@@ -31,27 +31,26 @@ struct QefSum {
     return *this;
   }
 
-  /// Entry i of the fourteen, in the order of `pairs`.
+  /// Returns entry i of the fourteen, in the order of `pairs`.
   double value(int i) const { return pairs[i / 2][i % 2]; }
-  /// Number of planes.
   double planes() const { return value(13); }
-  /// Mean of the crossings: where minimisers start from, and the `average` placement.
+  /// Returns the mean of the crossings: the start of minimisers, and the `average` placement.
   Eigen::Vector3d mass_point() const {
     return Eigen::Vector3d(value(10), value(11), value(12)) * (1.0 / planes());
   }
-  /// E(x) in square voxels, never negative.
+  /// Returns E(x) in square voxels, never negative.
   double error(const Eigen::Vector3d& x) const;
 };
 
-/// Least share of the largest singular value that minimisers() tells from zero: with a smaller `truncation`
-/// it takes this one. Sums of squares in double precision know no more of a singular value.
+/// Least share of the largest singular value that minimisers() distinguishes from zero, which replaces a
+/// smaller `truncation`: the precision of sums of squares in double precision.
 inline constexpr double kLeastTruncation = 1e-6;
 
 /// Writes for each sum the minimiser nearest to its start by truncated singular value decomposition (§6.2.1):
 /// singular values of A below `truncation` times the largest are set to zero. It may lie anywhere. `starts`
-/// holds as many places as there are sums, or none for the mass points; they and `out`, which has room for as
-/// many, are in the sums' frame. Below a truncation of 0.001 single precision would not do, and each sum is
-/// solved by itself in double precision.
+/// holds as many points as there are sums, or none for the mass points; they and `out`, which has room for as
+/// many, are in the sums' frame. Below a truncation of 0.001 single precision would not suffice, and each sum
+/// is solved by itself in double precision.
 void minimisers(std::span<const QefSum* const> sums, std::span<const Eigen::Vector3d> starts,
                 double truncation, Eigen::Vector3d* out);
 

@@ -11,7 +11,7 @@
 #include "algorithms/lattice/simd/simd_level.h"
 
 namespace hermesh {
-namespace {
+namespace qef_sum_test {
 
 using Eigen::Vector3d;
 using Eigen::Vector3f;
@@ -34,7 +34,7 @@ Vector3d minimiser(const QefSum& sum, double truncation) {
   return result;
 }
 
-/// Planes about a place in a block, all within an angle of some normal: from flat to a corner.
+/// Planes about a point in a block, all within an angle of some normal: from flat to a corner.
 Planes random_planes(std::mt19937& random, float spread) {
   std::uniform_real_distribution<float> unit(-1.0f, 1.0f);
   const auto vector = [&] { return Vector3f(unit(random), unit(random), unit(random)); };
@@ -121,7 +121,7 @@ TEST(QefSum, WithoutTruncationNearlyParallelPlanesMeetWhereTheyDo) {
   // Along x the two normals have the singular value √2·0.01, the others √2 and none at all.
   EXPECT_NEAR(minimiser(planes.sum, 0.1)[0], 0.0, 1e-3);
   EXPECT_LT((minimiser(planes.sum, 0.0) - Vector3d(10.0, 0.0, 0.1)).norm(), 1e-3);
-  // The least truncation keeps a direction without a singular value where it is, so that no place is
+  // The least truncation leaves a direction without a singular value unchanged, so that no position is
   // infinite.
   EXPECT_EQ(minimiser(planes.sum, 0.0), minimiser(planes.sum, kLeastTruncation));
 }
@@ -145,5 +145,5 @@ TEST(QefSum, SumsAddUp) {
   EXPECT_EQ(a.sum.planes(), a.slow.planes() + b.slow.planes());
 }
 
-}  // namespace
+}  // namespace qef_sum_test
 }  // namespace hermesh

@@ -1,4 +1,4 @@
-// Whether a cubical region may be meshed as if it were one cell: the two topology tests of Aldén 2011, §6.3.
+// The two topology tests of Aldén 2011, §6.3, for a cubical region that is to be meshed as one cell.
 #pragma once
 
 #include <array>
@@ -11,8 +11,8 @@ namespace hermesh {
 
 namespace region_topology {
 
-/// The corners of a cube that `from` reaches along edges whose ends are both in `set`. Corner (x, y, z) is
-/// bit 4x + 2y + z.
+/// Returns the corners of a cube that `from` reaches along edges whose ends are both in `set`. Corner (x, y,
+/// z) is bit 4x + 2y + z.
 constexpr unsigned reached(unsigned set, unsigned from) {
   for (;;) {
     unsigned next = from;
@@ -26,7 +26,7 @@ constexpr unsigned reached(unsigned set, unsigned from) {
 
 /// The first test for all 256 patterns of corners inside (Gerstner & Pajarola 2000): edges whose ends have
 /// one sign are collapsed; the contour is one disc if a single edge is left, that is, if the corners inside
-/// hang together, those outside do, and there are some of both.
+/// are connected, those outside are, and there are some of both.
 constexpr std::array<bool, 256> collapse_table() {
   std::array<bool, 256> table{};
   for (unsigned inside = 1; inside < 255; ++inside) {
@@ -37,14 +37,14 @@ constexpr std::array<bool, 256> collapse_table() {
   return table;
 }
 
-/// The table of the first test, made by the compiler: filled at start-up it could be read before it is whole
-/// (trap T13).
+/// The table of the first test, made by the compiler: filled at start-up it could be read too early (trap
+/// T13).
 inline constexpr std::array<bool, 256> kCollapsesToOneEdge = collapse_table();
 
 /// The signs of 3×3×3 samples, half a region's side apart: bit 9x + 3y + z.
 using Signs27 = std::uint32_t;
 
-/// The eight corners among the 27 samples, at the bits of the table.
+/// Returns the eight corners among the 27 samples, at the bits of the table.
 constexpr unsigned corners(Signs27 signs) {
   unsigned result = 0;
   for (unsigned corner = 0; corner < 8; ++corner)
@@ -69,7 +69,7 @@ constexpr bool middles_agree(Signs27 s) {
   return (all != 0 && all != 255) || (all & 1) == ((s >> 13) & 1);
 }
 
-/// Whether a region passes both tests.
+/// Returns true if a region passes both tests.
 constexpr bool passes(Signs27 signs) { return kCollapsesToOneEdge[corners(signs)] && middles_agree(signs); }
 
 }  // namespace region_topology
@@ -77,8 +77,8 @@ constexpr bool passes(Signs27 signs) { return kCollapsesToOneEdge[corners(signs)
 /// The signs of the 9³ samples at the corners of a block's cells.
 class SignLattice {
  public:
-  /// The signs of a block, or null where all are `uniform`. The block itself and its upper neighbours are
-  /// parts 4x + 2y + z.
+  /// The signs of a block, or null if all are `uniform`. The block itself and its upper neighbours are parts
+  /// 4x + 2y + z.
   struct Part {
     const BlockMask* inside = nullptr;
     bool uniform = false;
@@ -95,7 +95,8 @@ class SignLattice {
       }
   }
 
-  /// The signs at the 27 samples of the region of `side` 2, 4 or 8 cells whose first sample is (x, y, z).
+  /// Returns the signs at the 27 samples of the region of `side` 2, 4 or 8 cells whose first sample is (x, y,
+  /// z).
   region_topology::Signs27 around(int x, int y, int z, int side) const {
     const int half = side / 2;
     region_topology::Signs27 signs = 0;

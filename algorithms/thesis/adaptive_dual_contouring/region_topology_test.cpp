@@ -7,7 +7,7 @@
 #include <utility>
 
 namespace hermesh {
-namespace {
+namespace region_topology_test {
 
 using namespace region_topology;
 
@@ -63,7 +63,7 @@ TEST(RegionTopology, MiddlesAgreeWithSomeCorner) {
   std::mt19937 random(1);
   int agreeing = 0;
   for (int i = 0; i < 2'000'000; ++i) {
-    // All signs alike but for a few, so that both answers come often.
+    // All signs alike except for a few, so that both answers come often.
     Signs27 signs = static_cast<Signs27>(random()) & static_cast<Signs27>(random()) & ((1u << 27) - 1);
     if (i & 1) signs &= static_cast<Signs27>(random());
     if (i & 2) signs ^= (1u << 27) - 1;
@@ -96,5 +96,5 @@ TEST(RegionTopology, TheLatticeGivesTheSignsOfRegions) {
       }
 }
 
-}  // namespace
+}  // namespace region_topology_test
 }  // namespace hermesh

@@ -4,6 +4,7 @@
 #include <tbb/enumerable_thread_specific.h>
 #include <tbb/parallel_for.h>
 
+#include <Eigen/Geometry>
 #include <cstring>
 #include <deque>
 #include <numeric>
@@ -19,22 +20,22 @@ using kernels::Batch;
 using kernels::kBatch;
 using kernels::Kernels;
 
-/// With more small triangles than this near a leaf's 512 voxels, a voxel looks for its triangle; with fewer,
-/// a triangle for its voxels. Where the two take equally long, measured.
+/// With more small triangles than this near a leaf's 512 voxels, a voxel searches its triangle; with fewer, a
+/// triangle its voxels. At this number both take equally long, as measured.
 constexpr std::size_t kManyTriangles = 1000;
 
-/// Up to sixteen triangles on their way to the kernels.
+/// Up to sixteen triangles that the kernels process together.
 struct Pending {
   kernels::MeshCorners corners;
   std::int32_t id[kBatch];
   int count = 0;
 
-  /// Takes triangle j of `from`, which is number `triangle` of the mesh.
+  /// Appends triangle j of `from`, which is number `triangle` of the mesh.
   void add(const kernels::MeshCorners& from, int j, std::uint32_t triangle) {
     for (int i = 0; i < 9; ++i) corners.corner[i][count] = from.corner[i][j];
     id[count++] = std::int32_t(triangle);
   }
-  /// Makes the unused places copies of the first triangle, so that they change nothing.
+  /// Fills the unused lanes with copies of the first triangle, which change nothing.
   void fill() {
     for (int j = count; j < kBatch; ++j) {
       for (auto& row : corners.corner) row[j] = row[0];
@@ -42,6 +43,36 @@ struct Pending {
     }
   }
 };
+
+/// Fills a lane of the batch with a triangle's longest side, or with a point if all corners coincide.
+void set_up_segment(const kernels::Corners& corners, int triangle, Batch& batch) {
+  Eigen::Vector3d corner[3];
+  for (int i = 0; i < 3; ++i)
+    for (int axis = 0; axis < 3; ++axis) corner[i][axis] = corners.corner[3 * i + axis][triangle];
+  int longest = 0;
+  const auto side = [&](int i) -> Eigen::Vector3d { return corner[(i + 1) % 3] - corner[i]; };
+  for (int i = 1; i < 3; ++i)
+    if (side(i).squaredNorm() > side(longest).squaredNorm()) longest = i;
+  const auto put = [&](int row, const Eigen::Vector3d& v) {
+    for (int axis = 0; axis < 3; ++axis) batch.f[row + axis][triangle] = float(v[axis]);
+  };
+  const Eigen::Vector3d& start = corner[longest];
+  const double length = side(longest).norm();
+  const Eigen::Vector3d along =
+      length > 0 ? Eigen::Vector3d(side(longest) / length) : Eigen::Vector3d(Eigen::Vector3d::UnitX());
+  const Eigen::Vector3d normal = along.unitOrthogonal(), across = along.cross(normal);
+  put(Batch::kHeight, normal);
+  batch.f[Batch::kHeight + 3][triangle] = float(-normal.dot(start));
+  for (int i = 0; i < 3; ++i) {
+    const int edge = Batch::kEdge + Batch::kPerEdge * i;
+    const double turn = i == 2 ? -1.0 : 1.0;
+    put(edge, turn * across);
+    batch.f[edge + 3][triangle] = float(-turn * across.dot(start));
+    put(edge + Batch::kAlong, along);
+    batch.f[edge + Batch::kLow][triangle] = float(along.dot(start));
+    batch.f[edge + Batch::kHigh][triangle] = float(along.dot(start) + length);
+  }
+}
 
 /// Computes one leaf at a time; its buffers serve the next. Each thread has its own.
 class LeafWork {
@@ -60,19 +91,19 @@ class LeafWork {
   bool run(const BlockAt& block, std::uint32_t number, float voxel_size, float* values, std::uint64_t* active,
            kernels::EdgeBits& crossed) {
     frame_ = {soup_.scale(), {block[0] * 8.0, block[1] * 8.0, block[2] * 8.0}};
-    // Distances are those of the samples; sides, and so crossings, are those of the places a hair beside them
-    // (sample_side.h).
+    // Distances are those of the samples; sides, and so crossings, are those of their side_place()s.
     side_frame_ = frame_;
     for (std::size_t a = 0; a < 3; ++a) side_frame_.origin[a] += kSideShift[a];
-    // Any start above reach² does: finish() limits it. The bytes 0xff make every number −1, no triangle.
+    // Any start above reach² is correct, since finish() limits it. The bytes 0xff make every number −1, no
+    // triangle.
     for (float& d : distances_.squared) d = float(reach_ * reach_) * 2.0f;
     if (ids_) std::memset(distances_.id, 0xff, sizeof distances_.id);
     crossed = {};
     crossed_ = &crossed;
     gather(block);
-    // Kernels that look from voxels take whole clusters, which may hold triangles to leave out. Of equally
-    // near triangles the first one looked at stays the nearest; the bins give them in one order whatever the
-    // threads do.
+    // Searches from voxels use whole clusters, which may have triangles to leave out. Of equally near
+    // triangles the first one stays the nearest; their order in the bins does not depend on the thread
+    // schedule.
     if (triangles_ > kManyTriangles && !without_)
       look_from_voxels();
     else
@@ -99,7 +130,7 @@ class LeafWork {
     return sum;
   }
 
-  /// Collects the clusters within reach of the block. Their spans stay valid until the bins go to another
+  /// Collects the clusters within reach of the block. Their spans are valid until the bins go to another
   /// slab.
   void gather(const BlockAt& block) {
     clusters_.clear();
@@ -111,8 +142,7 @@ class LeafWork {
     });
   }
 
-  /// Copies the corners of at most 16 triangles. Lanes beyond them keep what was there, and are masked out
-  /// later.
+  /// Copies the corners of at most 16 triangles. Lanes beyond them are unchanged, and masked out later.
   void fetch(std::span<const std::uint32_t> triangles, kernels::MeshCorners& to) const {
     for (std::size_t j = 0; j < triangles.size(); ++j) {
       const Triangle t = soup_.triangle(triangles[j]);
@@ -123,8 +153,8 @@ class LeafWork {
     }
   }
 
-  /// Looks for the voxels and edges of at most 16 triangles. Those that pass the test of the box gather in
-  /// `pending_` and `crossing_` until there are 16, so that the kernels work on full batches.
+  /// Adds at most 16 triangles. Those that pass the box test are collected in `pending_` and `crossing_`
+  /// until there are 16, so that the kernels work on full batches.
   void add(std::span<const std::uint32_t> triangles) {
     fetch(triangles, fetched_);
     const kernels::Near near = kernels_.near(fetched_, frame_, float(reach_));
@@ -163,29 +193,27 @@ class LeafWork {
     crossing_.count = 0;
   }
 
-  /// Makes linear functions of the pending triangles.
+  /// Computes the linear functions of the pending triangles.
   void set_up(Pending& triangles, Batch& batch) {
     triangles.fill();
     std::memcpy(batch.id, triangles.id, sizeof batch.id);
     kernels_.to_leaf(triangles.corners, frame_, corners_);
-    // A thin triangle has no normal to speak of, and counts as its longest side.
     for (unsigned thin = kernels_.set_up(corners_, batch); thin; thin &= thin - 1)
-      kernels::set_up_segment(corners_, __builtin_ctz(thin), batch);
+      set_up_segment(corners_, __builtin_ctz(thin), batch);
   }
 
-  /// Lets each voxel look for its triangle among the clusters, whose batches are set up when the first voxel
-  /// wants them.
+  /// Searches from each voxel among the clusters, whose batches are set up when first needed.
   void look_from_voxels() {
     boxes_.resize((clusters_.size() + kBatch - 1) / kBatch);
     for (std::size_t i = 0; i < boxes_.size() * kBatch; ++i) set_box(i);
     pointers_.assign(clusters_.size(), nullptr);
-    // The deque does not move its batches when it grows, and keeps them for the next leaf.
+    // A deque does not move its batches when it grows.
     used_ = 0;
     const kernels::LazyBatches lazy{boxes_.data(), pointers_.data(), int(clusters_.size()), &prepare, this};
     kernels_.update_from_many(lazy, float(reach_), ids_, distances_);
     for (const TriangleBins::Cluster& cluster : clusters_) {
-      // Triangles still look for their edges; most clusters of tiny ones lie between the grid lines and meet
-      // none. Whether one is at an edge does not depend on the reach, so a voxel will do.
+      // Edges are still found from the triangles; most clusters of tiny ones lie between the grid lines.
+      // Being at an edge does not depend on the reach, so that any reach is correct here.
       if (!meets_edges(cluster.box)) continue;
       fetch(cluster.triangles, fetched_);
       const unsigned there = (2u << (cluster.triangles.size() - 1)) - 1;
@@ -197,8 +225,8 @@ class LeafWork {
     kernels::Boxes& boxes = boxes_[i / kBatch];
     for (std::size_t a = 0; a < 3; ++a) {
       const bool there = i < clusters_.size();
-      // The box is rounded outwards by far more than single precision's error at this range. Those that fill
-      // up the last sixteen are so far away that none is ever near, and their squares are still finite.
+      // The box is rounded outwards by far more than single precision's error at this range. The boxes that
+      // fill up the last sixteen are so far away that none is ever near, and their squares are still finite.
       boxes.side[a][0][i % kBatch] =
           there ? float(clusters_[i].box.lower[a] - frame_.origin[a]) - 1e-5f : 1e18f;
       boxes.side[a][1][i % kBatch] =
@@ -222,9 +250,8 @@ class LeafWork {
     return &batch;
   }
 
-  /// Whether an edge of this leaf may meet the box: an edge lies at whole numbers on two axes, so at least
-  /// two of the box's sides must reach across one. The margin of 1e-5 is wider than the shift of the sides'
-  /// lattice.
+  /// Returns true if an edge of this leaf may meet the box: an edge lies at whole numbers on two axes, so
+  /// that at least two of the box's sides must contain one. The margin of 1e-5 is wider than kSideShift.
   bool meets_edges(const Bounds& box) const {
     int across = 0;
     for (std::size_t a = 0; a < 3; ++a) {
@@ -242,7 +269,7 @@ class LeafWork {
   bool ids_;
   const std::vector<std::uint32_t>* without_;
   const Kernels& kernels_;
-  kernels::LeafFrame frame_{}, side_frame_{};  ///< of the samples, and of the places of their sides
+  kernels::LeafFrame frame_{}, side_frame_{};  ///< of the samples, and of the points that define their sides
   std::vector<TriangleBins::Cluster> clusters_;
   std::size_t triangles_ = 0;  ///< in the clusters
   kernels::Distances distances_;
@@ -257,7 +284,7 @@ class LeafWork {
   std::size_t used_ = 0;
 };
 
-/// A leaf of OpenVDB with these values; its buffer is not filled before they are copied in.
+/// Returns a leaf of OpenVDB with these values.
 std::unique_ptr<FloatLeaf> make_leaf(const BlockAt& block, const float* values, const std::uint64_t* active) {
   auto leaf = std::make_unique<FloatLeaf>(
       openvdb::PartialCreate(), openvdb::Coord(block[0] * 8, block[1] * 8, block[2] * 8), 0.0f, false);
@@ -269,9 +296,8 @@ std::unique_ptr<FloatLeaf> make_leaf(const BlockAt& block, const float* values, 
   return leaf;
 }
 
-/// Calls f(block) for the blocks, in parallel, slab by slab of the bins. It does a part of a slab at a time,
-/// so that this thread can report between them. Few blocks make a task: one of a fine mesh takes a good part
-/// of a millisecond, and a slab's last tasks are waited for.
+/// Calls f(block) for the blocks, in parallel, slab by slab of the bins, and reports progress between parts
+/// of a slab. A task has few blocks: one of a fine mesh takes a good part of a millisecond.
 template <class F>
 void for_each_slab(TriangleBins& bins, const std::vector<BlockAt>& at, std::span<const std::uint32_t> blocks,
                    RunContext& context, F&& f) {
@@ -295,7 +321,7 @@ void for_each_slab(TriangleBins& bins, const std::vector<BlockAt>& at, std::span
   bins.forget_slabs();
 }
 
-/// The nearest triangles in OpenVDB's order, from the kernels' order of 2×2×4 voxels.
+/// Returns the nearest triangles in OpenVDB's order, from the kernels' order of 2×2×4 voxels.
 LeafTriangles nearest_triangles(const kernels::Distances& distances) {
   LeafTriangles result;
   for (int x = 0; x < 8; ++x)
@@ -335,7 +361,6 @@ Band compute_band(const IndexSoup& soup, TriangleBins& bins, const BandWork& wor
   band.leaves.resize(band.blocks.size());
   band.crossed.resize(band.blocks.size());
   if (work.nearest) band.nearest.resize(band.blocks.size());
-  // Every block has its own place in the arrays, which are as long as they will be: threads share nothing.
   find_leaves(soup, bins, work, context, [&](const FoundLeaf& leaf) {
     band.crossed[leaf.block] = leaf.crossed;
     if (!leaf.any) return;

@@ -1,4 +1,4 @@
-// Distances and crossed grid edges of every 8³ block of voxels near the triangles; signs come later.
+// Distances without sign, and crossed grid edges, of every 8³ block of voxels near the triangles.
 #pragma once
 
 #include <functional>
@@ -11,8 +11,8 @@
 
 namespace hermesh {
 
-/// Number of the nearest triangle of each voxel of a leaf, in OpenVDB's order, x slowest. It means nothing
-/// for a voxel that is out of reach.
+/// Number of the nearest triangle of each voxel of a leaf, in OpenVDB's order, x slowest; undefined for a
+/// voxel out of reach.
 using LeafTriangles = std::array<std::int32_t, 512>;
 
 /// Distances around the triangles, without signs. Block i is number i of `TriangleBins::blocks()`.
@@ -23,39 +23,38 @@ struct Band {
   /// where no voxel is.
   std::vector<std::unique_ptr<FloatLeaf>> leaves;
   std::vector<kernels::EdgeBits> crossed;  ///< edges between side_place()s that a triangle crosses
-  std::vector<std::unique_ptr<LeafTriangles>> nearest;  ///< empty unless asked for
+  std::vector<std::unique_ptr<LeafTriangles>> nearest;  ///< empty unless requested
 };
 
-/// What was found for one block.
+/// The result for one block.
 struct FoundLeaf {
   std::uint32_t block = 0;  ///< number of the block
-  bool any = false;         ///< whether a voxel is within reach; if not, only `crossed` has a meaning
+  bool any = false;         ///< true if a voxel is within reach; if not, only `crossed` is valid
   /// World units, in OpenVDB's order, at most the reach.
   alignas(64) float values[512];
   /// Voxels below the reach, bit (y, z) of word x.
   std::uint64_t active[8];
   kernels::EdgeBits crossed;
-  LeafTriangles nearest;  ///< only where asked for
+  LeafTriangles nearest;  ///< only on request
 };
 
-/// What find_leaves() is to find.
+/// Options of find_leaves().
 struct BandWork {
   double reach = 3.0;  ///< voxels, at least 1
   double voxel_size = 1.0;
-  bool nearest = false;                                 ///< whether the nearest triangles are asked for
+  bool nearest = false;                                 ///< finds the nearest triangles, too
   const std::vector<std::uint32_t>* blocks = nullptr;   ///< numbers of the blocks to compute; null for all
   const std::vector<std::uint32_t>* without = nullptr;  ///< triangles to leave out, ascending; may be null
 };
 
-/// Calls found(leaf) once for each block, in any order and from several threads at once; what `leaf` holds
-/// depends on neither. Distances are exact to some 1e-6 voxel: every triangle that can be nearest to a voxel
-/// within reach is looked at. The bins are left without clusters, unless they have one slab.
+/// Calls found(leaf) once for each block, in any order and from several threads at once; `leaf` does not
+/// depend on either. Distances are exact to some 1e-6 voxel: every triangle that can be nearest to a voxel
+/// within reach is tested. Afterwards the bins have no clusters, unless they have one slab.
 /// @throws Cancelled.
 void find_leaves(const IndexSoup& soup, TriangleBins& bins, const BandWork& work, RunContext& context,
                  const std::function<void(const FoundLeaf&)>& found);
 
-/// The distances of all blocks, in memory at once. `work.blocks` and `work.without` count as in
-/// find_leaves().
+/// Returns the distances of all blocks, as find_leaves() finds them.
 /// @throws Cancelled.
 Band compute_band(const IndexSoup& soup, TriangleBins& bins, const BandWork& work, RunContext& context);
 

@@ -13,17 +13,16 @@
 namespace hermesh {
 namespace {
 
-/// A triangle whose box is longer than this, in voxels, is large. Filing under every block costs memory for
-/// each, so small ones are filed once; but then a block must look at all that are filed around it.
+/// A triangle whose box is longer than this, in voxels, is large, and filed under every block that it comes
+/// near.
 constexpr double kLargest = 4.0;
-/// The number of triangles that a slab aims at, and the most slabs: few enough triangles that the clusters of
-/// three slabs are small beside the volume, few enough slabs that each keeps all threads busy.
+/// The intended number of triangles of a slab, and the most slabs: few enough triangles that the clusters of
+/// three slabs are small compared with the volume, few enough slabs that each keeps all threads busy.
 constexpr std::size_t kInSlab = 1 << 16;
 constexpr std::size_t kMostSlabs = 16;
-/// A thread that asks in any order keeps the bins around its block, and more while they are small: up to as
-/// many bins, or as many triangles.
+/// A thread whose queries come in any order keeps up to this many bins, or this many triangles.
 constexpr std::size_t kCachedBins = 64, kCachedTriangles = 1 << 16;
-/// Bins with more triangles than this are ordered by cells, which is quicker and nearly as compact.
+/// Bins with more triangles than this are ordered by cells, which is faster and nearly as compact.
 constexpr std::size_t kManyPieces = 256;
 
 std::int32_t block_of(double voxel) { return static_cast<std::int32_t>(std::floor(voxel)) >> 3; }
@@ -52,18 +51,15 @@ void for_each_block_near(const Bounds& box, double reach, F&& f) {
   for (std::int32_t x = from[0]; x <= to[0]; ++x)
     for (std::int32_t y = from[1]; y <= to[1]; ++y) {
       const double gap_xy = gap2(0, x) + gap2(1, y);
-      // Corners of the box of blocks, which are farther than the reach, are left out.
       if (gap_xy > reach * reach) continue;
       for (std::int32_t z = from[2]; z <= to[2]; ++z)
         if (gap_xy + gap2(2, z) <= reach * reach) f(BlockAt{x, y, z});
     }
 }
 
-/// A test whether a block can hold a voxel within reach of a triangle: a large triangle's box has many blocks
-/// that are not near the triangle. Block and triangle are seen along the triangle's normal and the outward
-/// normals of its edges. Whatever these are, what is farther apart than the reach along one of them is so in
-/// space: the normal of a triangle whose corners lie on a line but for rounding is noise, and costs blocks
-/// that are looked into for nothing.
+/// A conservative test if a block has a voxel within reach of a triangle, by separating axes: the triangle's
+/// normal and the outward normals of its edges. Any directions are correct: if the corners lie on a line
+/// except for rounding, the normal is noise, and the test only accepts more blocks.
 class TriangleSlab {
  public:
   explicit TriangleSlab(const TriangleCorners& c) {
@@ -99,7 +95,7 @@ class TriangleSlab {
   int count_ = 0;
 };
 
-/// Pieces of the work whose number depends on its size alone, so that every thread count gives the same
+/// Pieces of the work whose number depends only on its size, so that every thread count gives the same
 /// result.
 struct Chunks {
   std::size_t items, size, count;
@@ -117,14 +113,14 @@ void parallel_chunks(const Chunks& chunks, const RunContext& context, F&& f) {
   });
 }
 
-/// A triangle by the sum of its box's lower and upper corner, twice the centre, in world units.
+/// The centre of a triangle's box.
 struct Centre {
-  Eigen::Vector3f at;
+  Eigen::Vector3f at;  ///< twice the centre, in world units
   std::uint32_t triangle;
 };
 
-/// Orders triangles so that each sixteen in a row are close together: halves the longest side, again and
-/// again.
+/// Orders triangles so that each sixteen in a row are close together, by halving the longest side
+/// recursively.
 void make_compact(std::span<Centre> centres) {
   while (centres.size() > kClusterSize) {
     Eigen::Vector3f low = centres[0].at, high = low;
@@ -136,7 +132,7 @@ void make_compact(std::span<Centre> centres) {
     (high - low).maxCoeff(&axis);
     // Whole clusters on the lower side.
     const std::size_t half = (centres.size() / 2 + kClusterSize - 1) / kClusterSize * kClusterSize;
-    // Equal places are told apart by number, so that the outcome is unique.
+    // Equal centres are ordered by number, so that the result is unique.
     std::nth_element(centres.begin(), centres.begin() + std::ptrdiff_t(half), centres.end(),
                      [&](const Centre& a, const Centre& b) {
                        return a.at[axis] != b.at[axis] ? a.at[axis] < b.at[axis] : a.triangle < b.triangle;
@@ -156,7 +152,6 @@ void sort_by_cell(const std::vector<Centre>& centres, const BlockAt& block, doub
   for (std::size_t i = 0; i < centres.size(); ++i) {
     std::uint32_t key = 0;
     for (int a = 0; a < 3; ++a) {
-      // A centre is stored as the sum of the ends of its box.
       const double place = 0.5 * double(centres[i].at[a]) * scale - 8.0 * block[std::size_t(a)];
       const std::uint32_t c = std::uint32_t(std::clamp(place * 2.0, 0.0, 15.0));
       for (int bit = 0; bit < kBits; ++bit) key |= (c >> bit & 1u) << (3 * bit + a);
@@ -169,21 +164,21 @@ void sort_by_cell(const std::vector<Centre>& centres, const BlockAt& block, doub
   for (std::size_t i = 0; i < centres.size(); ++i) sorted[next[cell[i]]++] = centres[i];
 }
 
-/// Bytes that a step between two numbers takes, seven bits in each.
+/// Returns the packed size of a step between two numbers, in bytes of seven bits.
 std::size_t packed_size(std::uint32_t step) {
   std::size_t bytes = 1;
   for (; step >= 128; step >>= 7) ++bytes;
   return bytes;
 }
 
-/// Writes a step at `at`, and moves `at` behind it.
+/// Writes a step at `at`, and advances `at`.
 void write_packed(std::uint32_t step, std::uint8_t*& at) {
   for (; step >= 128; step >>= 7) *at++ = std::uint8_t(step | 128);
   *at++ = std::uint8_t(step);
 }
 
-/// The box in sixteenths of a voxel from three voxels before the bin's first, rounded outwards: truncation
-/// and the added 1 do that. A small triangle lies well within 0 to 255, and the clamp only guards it.
+/// Returns the box as BinBounds, rounded outwards by truncation and the added 1. A small triangle lies well
+/// within 0 to 255; the clamp is only a guard.
 BinBounds in_sixteenths(const Bounds& box, const BlockAt& bin) {
   BinBounds result;
   for (int a = 0; a < 3; ++a) {
@@ -204,19 +199,19 @@ Bounds from_sixteenths(const BinBounds& box, const BlockAt& bin) {
   return result;
 }
 
-/// The triangles that a piece of the work files in a bin.
+/// The triangles of a bin in one piece of the work.
 struct BinRun {
   explicit BinRun(std::uint32_t of_bin) : code(of_bin) {}
   std::uint32_t code;  ///< of the bin in the piece's set
   BinBounds box;
   std::uint32_t count = 0, first = 0, last = 0;  ///< triangles
-  std::uint64_t bytes = 0;                       ///< packed, of all but the first; later, where they go
+  std::uint64_t bytes = 0;  ///< packed size of all except the first; later, their position
 };
 
-/// Numbers for the codes of a set, in the order in which they first come.
+/// Numbers for the codes of a set, in the order of their first use.
 class CodeNumbers {
  public:
-  /// The code's number, which is `next` if it has none.
+  /// Returns the code's number, which is `next` if it has none.
   std::uint32_t operator()(std::uint32_t code, std::uint32_t next) {
     if (code >= numbers_.size()) numbers_.resize((code | 511) + 1, BlockTable::kNone);
     if (numbers_[code] == BlockTable::kNone) numbers_[code] = next;
@@ -229,7 +224,7 @@ class CodeNumbers {
 
 }  // namespace
 
-/// What a first pass over the triangles tells, by piece of the work.
+/// The result of a first pass over the triangles, by piece of the work.
 struct TriangleBins::Survey {
   std::vector<BlockSet> bins;  ///< of small triangles
   std::vector<std::vector<BinRun>> runs;
@@ -261,8 +256,8 @@ TriangleBins::Survey TriangleBins::survey() {
   found.runs.resize(chunks.count);
   all_large_.resize(chunks.count);
   parallel_chunks(chunks, context_, [&](std::size_t chunk) {
-    // A chunk writes to its own runs and list of large triangles, and numbers bins by itself; numbers that
-    // all agree on come when the sets are merged.
+    // A chunk writes to its own runs and list of large triangles, and has its own numbers of bins until the
+    // sets are merged.
     std::vector<BinRun>& runs = found.runs[chunk];
     CodeNumbers numbers;
     for (std::uint32_t t = std::uint32_t(chunks.begin(chunk)); t < chunks.end(chunk); ++t) {
@@ -277,8 +272,7 @@ TriangleBins::Survey TriangleBins::survey() {
       if (number == runs.size()) runs.emplace_back(code);
       BinRun& run = runs[number];
       run.box.add(in_sixteenths(box, block));
-      // The first number of a run is a step from the last one of an earlier chunk, and so is measured in
-      // pack().
+      // The step to the first number of a run comes from an earlier chunk; see pack().
       if (run.count++ == 0)
         run.first = t;
       else
@@ -291,15 +285,15 @@ TriangleBins::Survey TriangleBins::survey() {
   return found;
 }
 
-/// Packs the triangles' numbers by bin. The boxes are made again rather than remembered, which for ten
-/// million triangles would take more memory than the volume.
+/// Packs the triangles' numbers by bin. Computes the boxes again: for ten million triangles they would take
+/// more memory than the volume.
 void TriangleBins::pack(Survey& survey) {
   const std::size_t bins = bins_.size();
   first_byte_.assign(bins + 1, 0);
   count_.assign(bins, 0);
   box_of_bin_.assign(bins, {});
-  // One thread goes through the chunks in their order, so that each run learns where its bytes begin within
-  // its bin, and from which number its first step is.
+  // One thread visits the chunks in order: each run gets the position of its bytes within its bin, and the
+  // number before its first step.
   std::vector<std::uint32_t> before(bins, 0);  // the last triangle so far
   for (std::size_t chunk = 0; chunk < survey.runs.size(); ++chunk) {
     const std::vector<std::uint32_t> translation = bins_.translation(survey.bins[chunk]);
@@ -312,7 +306,6 @@ void TriangleBins::pack(Survey& survey) {
       run.first = std::exchange(before[bin], run.last);
     }
   }
-  // The bins one after the other in one array.
   std::uint64_t total = 0;
   for (std::uint64_t& bytes : first_byte_) total += std::exchange(bytes, total);
   packed_.resize(total);
@@ -320,7 +313,7 @@ void TriangleBins::pack(Survey& survey) {
   parallel_chunks(chunks, context_, [&](std::size_t chunk) {
     std::vector<BinRun>& runs = survey.runs[chunk];
     const std::vector<std::uint32_t> translation = bins_.translation(survey.bins[chunk]);
-    // Each run has a range of bytes for itself, so that the chunks write at the same time.
+    // Each run has its own range of bytes.
     std::vector<std::uint8_t*> to;
     CodeNumbers numbers;
     for (const BinRun& run : runs) {
@@ -338,7 +331,7 @@ void TriangleBins::pack(Survey& survey) {
 }
 
 /// Cuts space into slabs: across x unless another side is much longer, for blocks are numbered along x first,
-/// so that those who ask for them in their order stay in a slab for long.
+/// so that queries in their order stay in a slab for long.
 void TriangleBins::choose_slabs() {
   place_.resize(bins_.size());
   std::array<std::map<std::int32_t, std::size_t>, 3> layers;  // how many triangles
@@ -353,12 +346,12 @@ void TriangleBins::choose_slabs() {
   for (const auto& [layer, count] : layers[axis_]) {
     filed += count;
     left -= count;
-    // A slab at least as thick as triangles reach, so that none but its neighbours matter to it.
+    // A slab is at least as thick as triangles reach, so that only its neighbours matter to it.
     if (left == 0 || filed < share || layer + 1 - begin < rings_) continue;
     slabs_.push_back({.end = begin = layer + 1, .bins = {}, .files = {}});
     filed = 0;
   }
-  // The last slab, or the only one, has no end, so that slab_of() knows every block.
+  // The last slab has no end, so that slab_of() is defined for every block.
   slabs_.push_back({.end = std::numeric_limits<std::int32_t>::max(), .bins = {}, .files = {}});
   for (std::uint32_t bin = 0; bin < bins_.size(); ++bin) {
     std::vector<std::uint32_t>& bins = slabs_[slab_of(bin_at_[bin])].bins;
@@ -375,8 +368,7 @@ void TriangleBins::choose_blocks(const Survey& survey) {
   tbb::parallel_for(std::size_t(0), chunks, [&](std::size_t chunk) {
     for (const BinRun& run : survey.runs[chunk]) {
       context_.check();
-      // Small triangles ask for blocks by the box of their run: a few blocks too many, and far fewer
-      // questions.
+      // The box of a run gives a few blocks too many, in far less time than those of its triangles.
       for_each_block_near(from_sixteenths(run.box, survey.bins[chunk].block(run.code)), reach_,
                           [&](const BlockAt& block) { sets[chunk].insert(block); });
     }
@@ -386,7 +378,7 @@ void TriangleBins::choose_blocks(const Survey& survey) {
   first_large_.assign(blocks_.size() + 1, 0);
   for (std::size_t chunk = 0; chunk < chunks; ++chunk) {
     const std::vector<std::uint32_t> translation = blocks_.translation(sets[chunks + chunk]);
-    // Count, scan, fill: here a block's code in its set becomes its number in the table, too.
+    // Count, scan, fill; replaces a block's code in its set by its number in the table, too.
     for (auto& [block, triangle] : pairs[chunk]) ++first_large_[block = blocks_.number(translation, block)];
   }
   std::uint64_t total = 0;
@@ -401,7 +393,7 @@ void TriangleBins::choose_blocks(const Survey& survey) {
   all_large_ = {};
 }
 
-/// The blocks near each large triangle, as codes of the set that they are put into.
+/// Returns the blocks near each large triangle, as codes of `blocks`, to which they are added.
 TriangleBins::Pairs TriangleBins::file_large(const std::vector<std::uint32_t>& triangles,
                                              BlockSet& blocks) const {
   Pairs pairs;
@@ -425,7 +417,7 @@ std::size_t TriangleBins::slab_of(const BlockAt& block) const {
 
 void TriangleBins::go_to_slab(std::size_t slab) {
   for (std::size_t i = 0; i < slabs_.size(); ++i)
-    // Going on by one slab keeps two of three.
+    // Advancing by one slab keeps two of three.
     if (i + 1 < slab || i > slab + 1) slabs_[i].files.reset();
   for (std::size_t i = slab == 0 ? 0 : slab - 1; i < std::min(slab + 2, slabs_.size()); ++i)
     if (!slabs_[i].files)
@@ -445,8 +437,8 @@ std::size_t TriangleBins::bytes_in_memory() const {
   return bytes;
 }
 
-/// The files of a bin for this thread alone, made when it first asks. They serve few questions, so the
-/// triangles stay in the mesh's order: where that goes along the surface, its sixteens are compact, too.
+/// Returns the files of a bin for this thread only, made on its first query. They serve few queries, so that
+/// the triangles stay in the mesh's order, in which clusters are often compact, too.
 const TriangleBins::Files& TriangleBins::own_files(std::uint32_t bin) const {
   std::unordered_map<std::uint32_t, Files>& cache = cache_.local();
   const auto known = cache.find(bin);
@@ -478,7 +470,6 @@ TriangleBins::Files TriangleBins::make_files(const std::vector<std::uint32_t>& b
   files.first_cluster.back() = clusters;
   files.order.resize(triangles);
   files.clusters.resize(clusters);
-  // Where each bin's numbers and clusters go is known by now, so that bins are filled in by any thread.
   const auto some = [&](std::size_t begin, std::size_t end) {
     Sorter sorter;
     for (std::size_t i = begin; i < end; ++i) {
@@ -489,7 +480,7 @@ TriangleBins::Files TriangleBins::make_files(const std::vector<std::uint32_t>& b
       enclose(of_bin, files.clusters.data() + files.first_cluster[i]);
     }
   };
-  // The thread that asks is likely to be one of many already.
+  // The calling thread is probably one of many already.
   if (purpose == Purpose::few_questions) {
     some(0, bins.size());
     return files;
@@ -530,7 +521,8 @@ void TriangleBins::sort(std::uint32_t bin, std::span<std::uint32_t> triangles, S
                  [](const Centre& c) { return c.triangle; });
 }
 
-/// Boxes of each sixteen triangles, in the mesh's own single precision, in which minima and maxima are exact.
+/// Computes the boxes of each sixteen triangles, in the mesh's single precision, in which minima and maxima
+/// are exact.
 void TriangleBins::enclose(std::span<const std::uint32_t> triangles, BoundsOf<float>* clusters) const {
   for (std::size_t first = 0; first < triangles.size(); first += kClusterSize, ++clusters) {
     *clusters = box_of(triangles[first]);

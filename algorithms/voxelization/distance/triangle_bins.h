@@ -1,7 +1,7 @@
-// Which triangles can be near which block of voxels. Small triangles are filed once each, under the block of
-// their box's centre, in clusters of sixteen with a box of their own; large ones under every block that they
-// come near. The clusters exist for a slab of space at a time, for all of them together can outweigh the
-// volume that is made; what is kept of the rest are the triangles' numbers, packed.
+// The triangles that can be near each block of voxels. Small triangles are filed once each, under the block
+// of their box's centre, in clusters of sixteen with a box of their own; large ones under every block that
+// they come near. The clusters exist for a slab of space at a time, for all of them together can take more
+// memory than the volume; of the rest only the packed numbers of the triangles are stored.
 #pragma once
 
 #include <tbb/enumerable_thread_specific.h>
@@ -19,8 +19,8 @@
 
 namespace hermesh {
 
-/// The box from a block's first voxel to its last and `margin` voxels more on every side; voxels relative to
-/// the mesh's origin, as all boxes here whose name does not say otherwise.
+/// Returns the box from a block's first voxel to its last and `margin` voxels more on every side; in voxels
+/// relative to the mesh's origin, as all boxes here unless stated otherwise.
 inline Bounds around(const BlockAt& block, double margin) {
   Bounds box;
   for (int a = 0; a < 3; ++a) {
@@ -30,23 +30,31 @@ inline Bounds around(const BlockAt& block, double margin) {
   return box;
 }
 
-/// Triangles of a cluster at most: as many as a kernel's batch has lanes.
+/// Returns the box from a block's first voxel to the next block's, which has the block's cells, and `margin`
+/// voxels more on every side.
+inline Bounds cells_around(const BlockAt& block, double margin) {
+  Bounds box = around(block, margin);
+  box.upper.array() += 1.0;
+  return box;
+}
+
+/// The most triangles of a cluster: the lanes of a kernel's batch.
 inline constexpr std::size_t kClusterSize = 16;
 
-/// The box of small triangles that are filed in a bin, in sixteenths of a voxel from three voxels before the
-/// bin's first, rounded outwards. A small triangle reaches two voxels beyond its bin, so that eight bits are
-/// enough.
+/// The box of the small triangles of a bin, in sixteenths of a voxel from three voxels before the bin's
+/// first, rounded outwards. A small triangle reaches at most two voxels beyond its bin, so that eight bits
+/// are enough.
 using BinBounds = BoundsOf<std::uint8_t>;
 
 /// The triangles of a soup by the blocks of voxels that they can be near.
 class TriangleBins {
  public:
   /// Sorts the triangles. `reach` is how far from a triangle, in voxels, its distance matters. The soup and
-  /// the context have to outlive the bins.
+  /// the context must outlive the bins.
   /// @throws Cancelled.
   TriangleBins(const IndexSoup& soup, double reach, RunContext& context);
 
-  /// Blocks with a voxel that may be nearer than the reach to a triangle; some of them have none in the end.
+  /// Returns the blocks that may have a voxel within reach of a triangle.
   const BlockTable& blocks() const { return blocks_; }
 
   /// Up to sixteen small triangles that are close together.
@@ -55,33 +63,32 @@ class TriangleBins {
     Bounds box;
   };
   /// Calls f(cluster) for the clusters of small triangles filed near enough to `block`, most of which are
-  /// within reach, in an order that depends on the mesh alone. From any thread, but not from within f, where
-  /// the slabs around the block are not in memory: the clusters are made then, and kept for this thread's
-  /// next call.
+  /// within reach, in an order that depends only on the mesh. Any thread may call it, but not f itself: if
+  /// the slabs around the block are not in memory, the clusters are made for this thread and its next calls.
   template <class F>
   void for_each_cluster(const BlockAt& block, F&& f) const {
     for_each_cluster(block, around(block, reach_), f);
   }
-  /// Calls f(cluster) for the clusters that may meet the box `near`, which reaches no farther around the
-  /// block's voxels than the reach. The smaller the box, the fewer clusters have to be made.
+  /// Calls f(cluster) for the clusters that may meet the box `near`, which is within reach of the block's
+  /// voxels. A smaller box needs fewer clusters.
   template <class F>
   void for_each_cluster(const BlockAt& block, const Bounds& near, F&& f) const;
-  /// Large triangles within reach of block number `i`, in ascending order.
+  /// Returns the large triangles within reach of block number `i`, in ascending order.
   std::span<const std::uint32_t> large(std::uint32_t i) const {
     return {large_.data() + first_large_[i], first_large_[i + 1] - first_large_[i]};
   }
 
-  /// Number of the slabs that space is cut into across one axis; the triangles that matter to a block are in
-  /// its own slab and the two beside it.
+  /// Returns the number of slabs that space is cut into across one axis; the triangles that matter to a block
+  /// are in its own slab and the two next to it.
   std::size_t slab_count() const { return slabs_.size(); }
-  /// Number of the slab that a block is in.
+  /// Returns the number of the slab that contains a block.
   std::size_t slab_of(const BlockAt& block) const;
-  /// Makes the clusters of a slab and its neighbours, and forgets those of the others. For work that goes
-  /// from slab to slab; not while another thread asks for clusters. @throws Cancelled.
+  /// Makes the clusters of a slab and its neighbours, and frees those of the others. For work slab by slab;
+  /// not while another thread queries clusters. @throws Cancelled.
   void go_to_slab(std::size_t slab);
-  /// Forgets all clusters, unless there is but one slab, whose clusters stay for every later question.
+  /// Frees all clusters, unless there is only one slab.
   void forget_slabs();
-  /// Bytes that the small triangles take now.
+  /// Returns the current size of the small triangles in bytes.
   std::size_t bytes_in_memory() const;
 
  private:
@@ -125,19 +132,19 @@ class TriangleBins {
   BlockTable bins_;
   std::vector<BlockAt> bin_at_;
   std::vector<BinBounds> box_of_bin_;
-  /// Numbers of the triangles of each bin, ascending: what each is above the one before, seven bits a byte,
-  /// the lowest first, the eighth bit set where more follow.
+  /// Numbers of the triangles of each bin, ascending, as differences: seven bits per byte, the lowest first,
+  /// the eighth bit set if more follow.
   std::vector<std::uint8_t> packed_;
   std::vector<std::uint64_t> first_byte_;
   std::vector<std::uint32_t> count_;
   std::size_t axis_ = 0;
   std::vector<Slab> slabs_;
-  std::vector<std::uint32_t> place_;  ///< place of each bin among those of its slab
+  std::vector<std::uint32_t> place_;  ///< index of each bin among those of its slab
   BlockTable blocks_;
   std::vector<std::vector<std::uint32_t>> all_large_;  ///< large triangles, by piece of the work
   std::vector<std::uint64_t> first_large_;
   std::vector<std::uint32_t> large_;
-  /// Files of single bins, by thread, for those who ask in any order.
+  /// Files of single bins, by thread, for queries in any order.
   mutable tbb::enumerable_thread_specific<std::unordered_map<std::uint32_t, Files>> cache_;
 };
 

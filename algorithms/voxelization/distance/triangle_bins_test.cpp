@@ -12,11 +12,11 @@
 #include "algorithms/voxelization/distance/band.h"
 
 namespace hermesh {
-namespace {
+namespace triangle_bins_test {
 
 using Eigen::Vector3f;
 
-/// Triangles of about `size` in random order on the way of a long bent sheet, so that there are many slabs.
+/// Triangles of about `size` in random order along a long bent sheet, so that there are many slabs.
 PolygonMesh sheet(std::size_t count, float size, bool shuffled) {
   std::mt19937 random(7);
   const auto number = [&](float scale) { return scale * (float(random() % 100'000u) / 100'000.0f - 0.5f); };
@@ -163,7 +163,7 @@ TEST(TriangleBins, SmallBoxFindsWhatMeetsIt) {
   }
 }
 
-/// Distances do not depend on how the mesh orders its triangles, and so not on what is filed where.
+/// Distances do not depend on the order of the triangles in the mesh.
 TEST(Band, SameDistancesWhateverTheOrderOfTheTriangles) {
   PolygonMesh mesh = sheet(200'000, 1.0f, false);
   RunContext context;
@@ -187,10 +187,10 @@ TEST(Band, SameDistancesWhateverTheOrderOfTheTriangles) {
   for (std::size_t i = 0; i < once.blocks.size(); ++i)
     for (unsigned v = 0; v < (once.leaves[i] ? 512u : 0u); ++v) {
       // Of two triangles that share the nearest point one may be left out, as its cluster cannot be nearer;
-      // their distances are equal but for the rounding of their planes.
+      // their distances are equal except for the rounding of their planes.
       ASSERT_NEAR(once.leaves[i]->getValue(v), other.at(once.blocks[i])->getValue(v), 2e-6);
     }
 }
 
-}  // namespace
+}  // namespace triangle_bins_test
 }  // namespace hermesh

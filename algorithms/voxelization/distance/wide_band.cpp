@@ -15,26 +15,24 @@ using openvdb::Coord;
 using FloatLeaf = openvdb::FloatTree::LeafNodeType;
 using IntLeaf = openvdb::Int32Tree::LeafNodeType;
 
-/// How far the band is to reach on one side of the surface.
-struct Side {
-  bool asked = false;  ///< whether the band is to be widened here
+/// The band on one side of the surface.
+struct BandSide {
+  bool asked = false;  ///< the band is widened here
   double width = 0;    ///< voxels
   float limit = 0;     ///< world units
 };
 
-/// Queries for the voxels of a leaf one after the other, where the answer to one bounds the search for the
-/// next.
+/// Queries for the voxels of a leaf one after the other: each result bounds the search for the next.
 class VoxelQueries {
  public:
   explicit VoxelQueries(const TriangleTree& tree) : tree_(tree) {}
 
   NearestTriangle operator()(const Eigen::Vector3d& p, double width) {
-    // Distance changes by no more than one moves, so the last one and the step bound this one; the rest is
-    // for rounding.
+    // Distance changes by no more than the step between the points; the rest is for rounding.
     const double known = last_ + (p - at_).norm() + 1e-6;
     NearestTriangle found{width * width, TriangleTree::kNone};
     if (known < width) found = tree_.nearest(p, known * known);
-    // A bound beyond the width, and one that rounding made too small, leave nothing found.
+    // Nothing is found for a bound beyond the width, or one that rounding made too small.
     if (found.triangle == TriangleTree::kNone) found = tree_.nearest(p, width * width);
     at_ = p;
     last_ = found.triangle == TriangleTree::kNone ? kFar : std::sqrt(found.squared);
@@ -67,10 +65,9 @@ class Widening {
     std::vector<FloatLeaf*> leaves;
     distance_.tree().getNodes(leaves);
     std::vector<std::unique_ptr<IntLeaf>> ids(leaves.size());
-    // `known_` has every block that is, or is about to be, looked at, so that each is once.
     for (const FloatLeaf* leaf : leaves) known_.insert(leaf->origin());
-    // The triangles go to copies of their leaves: adding leaves to a tree is for one thread at a time, while
-    // its other leaves are read here by all.
+    // The triangles go to copies of their leaves: only one thread may add leaves to a tree, and all read it
+    // here.
     parallel_blocks(leaves.size(), context_, [&](std::size_t i) {
       if (nearest_) ids[i] = ids_of(leaves[i]->origin());
       complete(*leaves[i], ids[i].get());
@@ -78,12 +75,12 @@ class Widening {
     add_ids(ids);
     std::vector<Coord> around;
     for (const FloatLeaf* leaf : leaves) add_neighbours(leaf->origin(), around);
-    // Then ring by ring outwards and inwards, until a ring has no voxel in the band.
+    // Ring by ring outwards and inwards, until a ring has no voxel in the band.
     while (!around.empty()) around = add_blocks(around);
   }
 
  private:
-  const Side& side_of(float value) const { return sides_[value < 0 ? 1 : 0]; }
+  const BandSide& side_of(float value) const { return sides_[value < 0 ? 1 : 0]; }
 
   std::unique_ptr<IntLeaf> ids_of(const Coord& origin) const {
     const IntLeaf* leaf = nearest_->tree().probeConstLeaf(origin);
@@ -95,26 +92,26 @@ class Widening {
       if (leaf && !leaf->isEmpty()) nearest_->tree().addLeaf(leaf.release());
   }
 
-  /// Completes the inactive voxels of a leaf: they keep their sign, and get their distance where the band
-  /// reaches. Active ones are right already.
+  /// Completes the inactive voxels of a leaf: they keep their sign, and get their distance within the band.
+  /// Active ones are correct already.
   void complete(FloatLeaf& leaf, IntLeaf* ids) const {
     VoxelQueries query(tree_);
     for (openvdb::Index i = 0; i < FloatLeaf::SIZE; ++i) {
       const float before = leaf.getValue(i);
-      const Side& side = side_of(before);
+      const BandSide& side = side_of(before);
       if (leaf.isValueOn(i) || !side.asked) continue;
       const Coord at = leaf.offsetToGlobalCoord(i);
       const NearestTriangle found = query(Eigen::Vector3d(at.x(), at.y(), at.z()), side.width);
       const float value = float(std::sqrt(found.squared) * voxel_size_);
       const bool on = found.triangle != TriangleTree::kNone && value < side.limit;
-      // Out of reach, the value is that of the new width, as in a band that had it from the start.
+      // Out of reach, the value is the new width.
       leaf.setValueOnly(i, std::copysign(on ? value : side.limit, before));
       leaf.setActiveState(i, on);
       if (ids && on) ids->setValueOn(i, boundary_.ids[found.triangle]);
     }
   }
 
-  /// Adds the blocks around one that nobody has looked at, and that are on a side which is to be widened.
+  /// Appends the unvisited blocks around one that are on a widened side.
   void add_neighbours(const Coord& block, std::vector<Coord>& around) {
     for (int x = -8; x <= 8; x += 8)
       for (int y = -8; y <= 8; y += 8)
@@ -125,13 +122,13 @@ class Widening {
   }
 
   /// Makes leaves of blocks without one, and returns the blocks around those that have a voxel in the band. A
-  /// block without a leaf lies on one side as a whole. The way from a voxel to the surface leads through
-  /// blocks that touch each other and have a voxel in the band, so none is missed.
+  /// block without a leaf lies on one side as a whole. The path from a voxel to the surface leads through
+  /// blocks that touch each other and have a voxel in the band, so that none is missed.
   std::vector<Coord> add_blocks(const std::vector<Coord>& blocks) {
     std::vector<std::unique_ptr<FloatLeaf>> leaves(blocks.size());
     std::vector<std::unique_ptr<IntLeaf>> ids(blocks.size());
     parallel_blocks(blocks.size(), context_, [&](std::size_t i) {
-      // A tile's value tells the side, for the flood fill has signed the tiles.
+      // The flood fill has signed the tiles.
       leaves[i] = std::make_unique<FloatLeaf>(blocks[i], distance_.tree().getValue(blocks[i]), false);
       if (nearest_) ids[i] = std::make_unique<IntLeaf>(blocks[i], -1, false);
       complete(*leaves[i], ids[i].get());
@@ -153,8 +150,8 @@ class Widening {
   openvdb::FloatGrid& distance_;
   openvdb::Int32Grid* nearest_;
   RunContext& context_;
-  Side sides_[2];  ///< exterior, interior
-  std::set<Coord> known_;
+  BandSide sides_[2];      ///< exterior, interior
+  std::set<Coord> known_;  ///< all visited blocks
 };
 
 }  // namespace

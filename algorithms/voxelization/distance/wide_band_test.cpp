@@ -5,30 +5,12 @@
 
 #include <cmath>
 
-#include "algorithms/search/triangle_tree.h"
-#include "algorithms/voxelization/voxelize.h"
+#include "algorithms/voxelization/voxelize_for_tests.h"
 
 namespace hermesh {
-namespace {
+namespace wide_band_test {
 
-using Eigen::Vector3d;
-
-void add_box(PolygonMesh& mesh, const Vector3d& low, const Vector3d& high) {
-  const std::uint32_t n = std::uint32_t(mesh.points.size());
-  for (int i = 0; i < 8; ++i)
-    mesh.points.push_back(
-        Vector3d(i & 1 ? high.x() : low.x(), i & 2 ? high.y() : low.y(), i & 4 ? high.z() : low.z())
-            .cast<float>());
-  for (const Quad& q :
-       {Quad{0, 2, 3, 1}, {4, 5, 7, 6}, {0, 1, 5, 4}, {2, 6, 7, 3}, {0, 4, 6, 2}, {1, 3, 7, 5}})
-    mesh.quads.push_back({n + q[0], n + q[1], n + q[2], n + q[3]});
-}
-
-/// The exact signed distance from p to a box, negative inside.
-double to_box(const Vector3d& p, const Vector3d& low, const Vector3d& high) {
-  const Vector3d out = (low - p).cwiseMax(p - high);
-  return out.cwiseMax(0.0).norm() + std::min(out.maxCoeff(), 0.0);
-}
+using namespace voxelize_for_tests;
 
 Voxelization wide(const PolygonMesh& mesh, double exterior, double interior, double voxel_size = 1.0,
                   SignRule signs = SignRule::flood_fill) {
@@ -44,8 +26,7 @@ Voxelization wide(const PolygonMesh& mesh, double exterior, double interior, dou
 
 TEST(WideBand, FilledBoxHasItsExactDistances) {
   const Vector3d low(-20.3, -11.6, 0.4), high(41.2, 38.1, 52.7);
-  PolygonMesh mesh;
-  add_box(mesh, low, high);
+  const PolygonMesh mesh = box(low, high);
   const Voxelization result = wide(mesh, 3, 100);
   const auto distance = result.distance->getConstAccessor();
   const auto nearest = result.nearest->getConstAccessor();
@@ -65,8 +46,7 @@ TEST(WideBand, FilledBoxHasItsExactDistances) {
 
 TEST(WideBand, BothSidesAreAsWideAsAsked) {
   const Vector3d low(0.1, 0.2, 0.3), high(60.7, 60.6, 60.4);
-  PolygonMesh mesh;
-  add_box(mesh, low, high);
+  const PolygonMesh mesh = box(low, high);
   const Voxelization result = wide(mesh, 19.5, 23.25);
   const auto distance = result.distance->getConstAccessor();
   for (int x = -24; x <= 85; ++x)
@@ -78,12 +58,10 @@ TEST(WideBand, BothSidesAreAsWideAsAsked) {
       }
 }
 
-/// What is beyond the width that needs the other search must be what that search gives, with parts that
-/// intersect, whose inner walls bound nothing.
+/// Both searches must give the same distances, even if parts intersect, whose inner walls bound nothing.
 TEST(WideBand, AgreesWithTheNarrowSearchWherePartsIntersect) {
-  PolygonMesh mesh;
-  add_box(mesh, {0.2, 0.3, 0.1}, {50.4, 40.7, 40.6});
-  add_box(mesh, {30.6, 10.7, 9.8}, {80.3, 60.2, 33.9});
+  PolygonMesh mesh = box({0.2, 0.3, 0.1}, {50.4, 40.7, 40.6});
+  append(mesh, box({30.6, 10.7, 9.8}, {80.3, 60.2, 33.9}));
   const Voxelization narrow = wide(mesh, 3, 16), filled = wide(mesh, 3, 40);
   const auto exact = filled.distance->getConstAccessor();
   const auto ids = filled.nearest->getConstAccessor();
@@ -100,8 +78,7 @@ TEST(WideBand, AgreesWithTheNarrowSearchWherePartsIntersect) {
 }
 
 TEST(WideBand, CapsOfHolesCountAsBoundary) {
-  PolygonMesh mesh;
-  add_box(mesh, {0.5, 0.5, 0.5}, {64.5, 64.5, 64.5});
+  PolygonMesh mesh = box({0.5, 0.5, 0.5}, {64.5, 64.5, 64.5});
   mesh.quads.erase(mesh.quads.begin());  // the side at z = 0.5
   const Voxelization narrow = wide(mesh, 3, 16, 1.0, SignRule::winding_number),
                      filled = wide(mesh, 3, 50, 1.0, SignRule::winding_number);
@@ -111,8 +88,7 @@ TEST(WideBand, CapsOfHolesCountAsBoundary) {
 }
 
 TEST(WideBand, SameBytesAtAnyThreadCount) {
-  PolygonMesh mesh;
-  add_box(mesh, {-7.3, -5.1, -6.2}, {9.4, 8.8, 11.5});
+  const PolygonMesh mesh = box({-7.3, -5.1, -6.2}, {9.4, 8.8, 11.5});
   const Voxelization many = wide(mesh, 20, 30, 0.25);
   const tbb::global_control one(tbb::global_control::max_allowed_parallelism, 1);
   const Voxelization single = wide(mesh, 20, 30, 0.25);
@@ -125,5 +101,5 @@ TEST(WideBand, SameBytesAtAnyThreadCount) {
     ASSERT_EQ(*value, ids.getValue(value.getCoord()));
 }
 
-}  // namespace
+}  // namespace wide_band_test
 }  // namespace hermesh

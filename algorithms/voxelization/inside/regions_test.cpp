@@ -5,7 +5,7 @@
 #include "algorithms/core/run_context.h"
 
 namespace hermesh {
-namespace {
+namespace regions_test {
 
 /// Blocks with crossed edges set by hand.
 struct Scene {
@@ -67,7 +67,7 @@ TEST(Regions, ARoomWithoutBlocksIsOneRegion) {
           if (x == -1 || y == -1 || z == -1 || x == size || y == size || z == size)
             blocks.push_back({x, y, z});
     Scene scene(blocks);
-    // The wall stands between voxels −5 and −4 and at the other end likewise.
+    // The wall is between voxels −5 and −4 and at the other end likewise.
     const std::int32_t low = -5, high = 8 * size + 3;
     for (int axis = 0; axis < 3; ++axis)
       for (std::int32_t u = low + 1; u <= high; ++u)
@@ -90,5 +90,5 @@ TEST(Regions, ARoomWithoutBlocksIsOneRegion) {
   }
 }
 
-}  // namespace
+}  // namespace regions_test
 }  // namespace hermesh

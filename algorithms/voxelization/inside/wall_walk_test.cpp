@@ -5,7 +5,7 @@
 #include "algorithms/core/run_context.h"
 
 namespace hermesh {
-namespace {
+namespace wall_walk_test {
 
 using Eigen::Vector3d;
 
@@ -21,12 +21,12 @@ PolygonMesh box() {
 
 bool is_inside(const Vector3d& p) { return p.cwiseAbs().maxCoeff() < 2.4; }
 
-/// The places of a walk that begins where the way meets the mesh.
+/// Returns the points of a walk that begins where the segment meets the mesh.
 std::vector<Vector3d> walk(const PolygonMesh& mesh, const Vector3d& from, const Vector3d& way) {
   RunContext context;
   const IndexSoup soup(mesh, 1.0);
   const TriangleBins bins(soup, 3.0, context);
-  CellObstacles obstacles(soup, bins, 8);
+  CellObstacles obstacles(soup, bins);
   WallWalk walk(soup, obstacles);
   walk.begin(from, way);
   std::vector<Vector3d> places;
@@ -60,7 +60,7 @@ TEST(WallWalk, WindingCopiesAndTrianglesWithoutAreaDoNotMatter) {
   mesh.triangles.push_back({0, 1, 1});
   const std::vector<Vector3d> places = walk(mesh, {0.3, 0.2, 3.0}, {0, 0, -1});
   EXPECT_GE(places.size(), 12u);
-  EXPECT_LE(places.size(), 13u);  // a copy may be gone to beside what it is a copy of
+  EXPECT_LE(places.size(), 13u);  // a copy may be visited in addition to its original
   for (const Vector3d& at : places) EXPECT_FALSE(is_inside(at)) << at.transpose();
 }
 
@@ -72,5 +72,5 @@ TEST(WallWalk, CrossesToTheOppositeWall) {
   EXPECT_EQ(walk(mesh, {0.3, 0.2, 3.0}, {0, 0, -1}).size(), 24u);
 }
 
-}  // namespace
+}  // namespace wall_walk_test
 }  // namespace hermesh

@@ -26,7 +26,7 @@ template <class Real>
   return p * q;
 }
 
-/// atan2(y, x), and 0 rather than no number where both are 0.
+/// Returns atan2(y, x), and 0 rather than NaN if both are 0.
 template <class Real>
 [[gnu::always_inline]] inline Real arctan2(Real y, Real x) {
   constexpr Real kPi = Real(3.14159265358979324), kTiny = Real(1e-36);
@@ -39,7 +39,7 @@ template <class Real>
 }
 
 /// Adds a triangle's solid angle at each point: van Oosterom & Strackee, The Solid Angle of a Plane Triangle,
-/// IEEE Trans. Biomed. Eng. 30(2), 1983, eq. 8. The loop holds scalars alone, which the compiler can turn
+/// IEEE Trans. Biomed. Eng. 30(2), 1983, eq. 8. The loop has scalars only, which the compiler can turn
 /// into lanes.
 template <class Real>
 void add_solid_angle(const PlacedTriangle<Real>& triangle, const Targets& targets) {

@@ -7,9 +7,8 @@
 
 namespace hermesh::winding {
 
-/// Points relative to an origin near them, in voxels, and for each the solid angle that it was found to be
-/// surrounded by so far, 4π for once around. Every point has its own sum, so that the order of additions, and
-/// with it every bit, is the same for any width of the lanes.
+/// Points relative to an origin near them, in voxels, and the sum of solid angles at each, 4π for once
+/// around. Every point has its own sum, so that the bits do not depend on the number of lanes.
 struct Targets {
   const float *x, *y, *z;
   float* solid_angle;
@@ -18,8 +17,8 @@ struct Targets {
 
 /// Field of the triangles in a box, seen from afar: their area vectors n and the distances u from the box's
 /// centre integrated up to second order, for a radius of 1 (Barill et al., Fast Winding Numbers for Soups and
-/// Clouds, ACM TOG 37(4), 2018, equations 7–9). As the field is harmonic, symmetric tensors without traces
-/// say it all.
+/// Clouds, ACM TOG 37(4), 2018, equations 7–9). The field is harmonic, so that symmetric tensors without
+/// traces are sufficient.
 struct Multipole {
   float radius = -1;  ///< in voxels, of a sphere about the box's centre that holds the triangles; −1: empty
   float first[3]{};   ///< ∫ n
@@ -38,13 +37,13 @@ struct PlacedTriangle {
 /// See simd_level.h.
 struct Kernels {
   SimdLevel level;
-  /// Adds what the triangles in a box make up, seen from points outside its sphere. `centre` is the box's
-  /// relative to the targets' origin.
+  /// Adds the field of the triangles in a box at points outside its sphere. `centre` is the box's, relative
+  /// to the targets' origin.
   void (*add_multipole)(const Multipole& multipole, const float centre[3], const Targets& targets);
   /// Adds the solid angle of a triangle to within 3e-6; nothing for a point in its plane but outside it.
   void (*add_triangle)(const PlacedTriangle<float>& triangle, const Targets& targets);
-  /// As add_triangle(), in double precision, for triangles that are large beside the distances between the
-  /// points.
+  /// As add_triangle(), in double precision, for triangles that are large compared with the distances
+  /// between the points.
   void (*add_large_triangle)(const PlacedTriangle<double>& triangle, const Targets& targets);
   static const Kernels sse2, avx2, avx512;
 };

@@ -31,34 +31,23 @@ constexpr int kTriple[10][3] = {{0, 0, 0}, {0, 0, 1}, {0, 0, 2}, {0, 1, 1}, {0, 
 /// Where a pair's component is in kPair's order.
 constexpr int kPlace[3][3] = {{0, 1, 2}, {1, 3, 4}, {2, 4, 5}};
 
-/// Centre of a box of the tree in voxels.
-Eigen::Vector3d box_centre(const TriangleTree& tree, std::size_t box) {
+/// A box of the tree, in the unit of its points; lower > upper if it is empty.
+Bounds box_of(const TriangleTree& tree, std::size_t box) {
   const TriangleTree::BoxPack& pack = tree.packs()[box / kFan];
-  Eigen::Vector3d centre;
+  Bounds result;
   for (int a = 0; a < 3; ++a)
-    centre[a] = 0.5 * (double{pack.lower[a][box % kFan]} + double{pack.upper[a][box % kFan]}) * tree.scale();
-  return centre;
+    result.lower[a] = pack.lower[a][box % kFan], result.upper[a] = pack.upper[a][box % kFan];
+  return result;
 }
 
-/// Half the diagonal of a box in voxels.
-double box_radius(const TriangleTree& tree, std::size_t box) {
-  const TriangleTree::BoxPack& pack = tree.packs()[box / kFan];
-  double squared = 0.0;
-  for (int a = 0; a < 3; ++a) {
-    const double side = double{pack.upper[a][box % kFan]} - double{pack.lower[a][box % kFan]};
-    squared += side * side;
-  }
-  return 0.5 * std::sqrt(squared) * tree.scale();
+/// Returns the centre of a box of the tree in voxels.
+Eigen::Vector3d box_centre(const TriangleTree& tree, std::size_t box) {
+  const Bounds bounds = box_of(tree, box);
+  return 0.5 * (bounds.lower + bounds.upper) * tree.scale();
 }
 
-/// Whether a place of a pack has no box: its lower corner is above its upper one.
-bool is_empty(const TriangleTree& tree, std::size_t box) {
-  const TriangleTree::BoxPack& pack = tree.packs()[box / kFan];
-  return pack.lower[0][box % kFan] > pack.upper[0][box % kFan];
-}
-
-/// Moments about a centre: the symmetric parts of n, n u and n u u summed over dipoles n at u, in voxels. The
-/// field is a contraction with symmetric tensors, so that other parts have no effect.
+/// Moments about a centre: the symmetric parts of n, n u and n u u summed over dipoles n at u, in voxels.
+/// Other parts have no effect on the field, a contraction with symmetric tensors.
 struct Moments {
   Eigen::Vector3d first = Eigen::Vector3d::Zero();
   std::array<double, 6> second{};
@@ -76,8 +65,8 @@ struct Moments {
     }
   }
 
-  /// Adds the moments of a child whose centre is at s: those about the child's centre, moved by the binomial
-  /// expansion of u + s. The child's are for a radius of 1, so each order gets its power of the radius back.
+  /// Adds the moments of a child whose centre is at s by the binomial expansion of u + s. The child's are for
+  /// a radius of 1, so that each order gets its power of the radius back.
   void add_child(const Multipole& child, const Eigen::Vector3d& s) {
     const double r = child.radius;
     const double r2 = r * r, r3 = r2 * r, r4 = r2 * r2;
@@ -90,8 +79,8 @@ struct Moments {
     }
   }
 
-  /// Takes the traces out, whose fields vanish, and scales to a radius of 1, so that single precision holds
-  /// the moments of any size of box.
+  /// Removes the traces, whose fields vanish, and scales to a radius of 1, so that single precision holds the
+  /// moments of boxes of any size.
   Multipole multipole(double radius) const {
     Multipole result;
     result.radius = static_cast<float>(radius);
@@ -114,8 +103,8 @@ struct Moments {
   }
 };
 
-/// The multipole of a leaf's triangles. Integrals up to second order over a triangle are those of the
-/// midpoints of the three sides with equal weights, so each triangle becomes three dipoles without loss.
+/// Returns the multipole of a leaf's triangles. Integrals up to second order over a triangle are those of the
+/// midpoints of the three sides with equal weights, so that three dipoles represent it exactly.
 Multipole leaf_multipole(const TriangleTree& tree, std::span<const std::int8_t> turns, std::size_t box) {
   const Eigen::Vector3d centre = box_centre(tree, box);
   Moments moments;
@@ -134,28 +123,31 @@ Multipole leaf_multipole(const TriangleTree& tree, std::span<const std::int8_t> 
   return moments.multipole(std::sqrt(squared) * (1 + 1e-7));
 }
 
-/// The multipole of a box from those of its children, without a look at the triangles.
+/// Returns the multipole of a box from those of its children.
 Multipole parent_multipole(const TriangleTree& tree, const std::vector<Multipole>& multipoles, Node ref) {
   const Eigen::Vector3d centre = box_centre(tree, ref.box);
   const std::size_t first = tree.child_pack(ref) * kFan;
   Moments moments;
   double radius = 0.0;
   for (std::size_t child = first; child < first + kFan; ++child) {
-    if (is_empty(tree, child)) continue;
+    if (box_of(tree, child).empty()) continue;
     const Eigen::Vector3d s = box_centre(tree, child) - centre;
     radius = std::max(radius, s.norm() + multipoles[child].radius);
     moments.add_child(multipoles[child], s);
   }
-  // Either sphere holds the triangles: the one around the children's spheres, and the one around the box.
-  return moments.multipole(std::min(radius, box_radius(tree, ref.box)) * (1 + 1e-7));
+  // The spheres around the children's spheres and around the box both contain the triangles.
+  const Bounds box = box_of(tree, ref.box);
+  double squared = 0.0;
+  for (int a = 0; a < 3; ++a) squared += (box.upper[a] - box.lower[a]) * (box.upper[a] - box.lower[a]);
+  return moments.multipole(std::min(radius, 0.5 * std::sqrt(squared) * tree.scale()) * (1 + 1e-7));
 }
 
-/// Up to kMaxBatch points, halved along the longest side of their box again and again, so that every half
-/// of the range is near itself.
-class Batch {
+/// Up to kMaxBatch points, halved recursively along the longest side of their box, so that each half is
+/// compact.
+class PointBatch {
  public:
-  Batch(const TriangleTree& tree, std::span<const Multipole> multipoles, std::span<const std::int8_t> turns,
-        double far, std::span<const Eigen::Vector3d> points)
+  PointBatch(const TriangleTree& tree, std::span<const Multipole> multipoles,
+             std::span<const std::int8_t> turns, double far, std::span<const Eigen::Vector3d> points)
       : tree_(tree), multipoles_(multipoles), turns_(turns), far_(far), count_(points.size()) {
     Bounds box;
     for (const Eigen::Vector3d& p : points) box.add(p);
@@ -180,13 +172,13 @@ class Batch {
   }
 
  private:
-  /// Tells where a range of points is cut in two: full blocks of 16 give whole lanes.
+  /// Returns the point at which a range is halved: full blocks of 16 give whole lanes.
   static std::size_t middle(std::size_t begin, std::size_t end) {
     return begin + std::min((end - begin + 31) / 32 * 16, end - begin);
   }
 
-  /// Orders a range so that each half is compact. Equal coordinates are told apart by number: the order is
-  /// unique.
+  /// Orders a range so that each half is compact. Equal coordinates are ordered by number, so that the order
+  /// is unique.
   void sort(std::span<const Eigen::Vector3d> points, std::size_t begin, std::size_t end) {
     if (end - begin <= kGroup) return;
     Bounds box;
@@ -202,18 +194,22 @@ class Batch {
     sort(points, cut, end);
   }
 
-  /// Adds the boxes of a pack; those that are empty, or hold a mere point, have no field.
+  /// Appends the boxes of a pack; those that are empty, or contain only a point, have no field.
   void push_children(std::size_t pack, std::uint32_t level, std::vector<Node>& boxes) const {
     for (std::size_t k = 0; k < kFan; ++k)
       if (multipoles_[pack * kFan + k].radius > 0)
         boxes.push_back({static_cast<std::uint32_t>(pack * kFan + k), level});
   }
 
-  /// Adds the given boxes to the points of a range: those that are far from all of them at once, those that
-  /// are large beside the range by their children, and the others to either half by itself.
+  /// Adds the fields of boxes to the points of a range: of those that are far from all points at once, of
+  /// those that are larger than the range by their children, and of the others to each half separately.
   void descend(std::size_t begin, std::size_t end, std::vector<Node> boxes) {
     const Targets targets{&x_[begin], &y_[begin], &z_[begin], &sum_[begin], end - begin};
-    const auto [lowest, highest] = box(targets);
+    Eigen::Vector3d lowest, highest;  // relative to the origin
+    for (int a = 0; const float* coordinates : {targets.x, targets.y, targets.z}) {
+      const auto [low, high] = std::minmax_element(coordinates, coordinates + targets.count);
+      lowest[a] = *low, highest[a++] = *high;
+    }
     const double extent = 0.5 * (highest - lowest).norm();
     const bool last = end - begin <= kGroup;
     std::vector<Node> later;
@@ -222,7 +218,7 @@ class Batch {
       boxes.pop_back();
       const Multipole& multipole = multipoles_[ref.box];
       const Eigen::Vector3d centre = box_centre(tree_, ref.box) - origin_;
-      // From the nearest point of the range's box, so that what is far from it is far from every point.
+      // From the nearest point of the range's box: a box that is far from it is far from every point.
       const double away = (centre - centre.cwiseMax(lowest).cwiseMin(highest)).norm();
       if (away >= far_ * multipole.radius) {
         const Eigen::Vector3f c = centre.cast<float>();
@@ -235,25 +231,13 @@ class Batch {
         later.push_back(ref);
       }
     }
-    // Every point adds the same boxes in the same order on any machine: which depends on the batch alone.
     if (last || later.empty()) return;
     const std::size_t cut = middle(begin, end);
     descend(begin, cut, later);
     descend(cut, end, std::move(later));
   }
 
-  /// The box of a range of points, relative to the batch's origin.
-  static std::pair<Eigen::Vector3d, Eigen::Vector3d> box(const Targets& targets) {
-    const float* coordinates[3] = {targets.x, targets.y, targets.z};
-    Eigen::Vector3d lowest, highest;
-    for (int a = 0; a < 3; ++a) {
-      const auto [low, high] = std::minmax_element(coordinates[a], coordinates[a] + targets.count);
-      lowest[a] = *low, highest[a] = *high;
-    }
-    return {lowest, highest};
-  }
-
-  /// Adds the exact solid angles of a leaf's triangles; one that is turned over has two corners swapped.
+  /// Adds the exact solid angles of a leaf's triangles; a flipped one has two corners swapped.
   void add_leaf(std::size_t box, const Targets& targets) const {
     for (const std::uint32_t t : tree_.leaf(box)) {
       const int turn = turns_.empty() ? 1 : turns_[t];
@@ -261,7 +245,7 @@ class Batch {
       const Eigen::Vector3d a = tree_.corner(t, 0) - origin_;
       const Eigen::Vector3d b = tree_.corner(t, turn > 0 ? 1 : 2) - origin_;
       const Eigen::Vector3d c = tree_.corner(t, turn > 0 ? 2 : 1) - origin_;
-      // Corners far outside the batch would lose in single precision what tells the samples apart.
+      // Single precision would misplace corners far outside the batch.
       const double reach = std::max({a.squaredNorm(), b.squaredNorm(), c.squaredNorm()});
       if (reach <= kFarAway * kFarAway * extent_ * extent_)
         kernels_.add_triangle(placed<float>(a, b, c), targets);
@@ -299,14 +283,13 @@ class Batch {
 
 }  // namespace
 
-WindingNumber::WindingNumber(const TriangleTree& tree, std::span<const std::int8_t> turns, double far)
-    : tree_(tree), turns_(turns), far_(far), multipoles_(tree.packs().size() * kFan) {
-  // Level by level from the leaves up: the boxes of one depend only on those of the level below, and not on
-  // each other.
+WindingNumber::WindingNumber(const TriangleTree& tree, std::span<const std::int8_t> turns)
+    : tree_(tree), turns_(turns), multipoles_(tree.packs().size() * kFan) {
+  // Level by level from the leaves up: the boxes of a level depend only on those of the level below.
   for (std::uint32_t level = 0; level < tree.level_count(); ++level) {
     const std::size_t end = level + 1 < tree.level_count() ? tree.first_pack(level + 1) : tree.packs().size();
     tbb::parallel_for(tree.first_pack(level) * kFan, end * kFan, [&](std::size_t box) {
-      if (is_empty(tree, box)) return;
+      if (box_of(tree, box).empty()) return;
       multipoles_[box] = level == 0
                              ? leaf_multipole(tree, turns, box)
                              : parent_multipole(tree, multipoles_, {static_cast<std::uint32_t>(box), level});
@@ -327,23 +310,9 @@ void WindingNumber::evaluate(std::span<const Eigen::Vector3d> points, std::span<
     if (multipoles_.empty())
       std::fill_n(values.begin() + first, count, 0.0f);
     else
-      Batch(tree_, multipoles_, turns_, far, points.subspan(first, count))
+      PointBatch(tree_, multipoles_, turns_, far, points.subspan(first, count))
           .evaluate(values.subspan(first, count));
   }
-}
-
-double exact_winding_number(std::span<const Eigen::Vector3f> points, std::span<const Triangle> triangles,
-                            double scale, const Eigen::Vector3d& p) {
-  double half = 0.0;
-  for (const Triangle& t : triangles) {
-    const Eigen::Vector3d a = points[t[0]].cast<double>() * scale - p;
-    const Eigen::Vector3d b = points[t[1]].cast<double>() * scale - p;
-    const Eigen::Vector3d c = points[t[2]].cast<double>() * scale - p;
-    const double la = a.norm(), lb = b.norm(), lc = c.norm();
-    half +=
-        std::atan2((b - a).cross(c - a).dot(a), la * lb * lc + a.dot(b) * lc + b.dot(c) * la + c.dot(a) * lb);
-  }
-  return half * 0.5 * std::numbers::inv_pi;
 }
 
 }  // namespace hermesh

@@ -9,9 +9,12 @@
 #include <random>
 
 #include "algorithms/lattice/simd/simd_level.h"
+#include "algorithms/voxelization/voxelize_for_tests.h"
 
 namespace hermesh {
-namespace {
+namespace winding_number_test {
+
+using voxelize_for_tests::exact_winding_number;
 
 struct Soup {
   std::vector<Eigen::Vector3f> points;
@@ -81,7 +84,7 @@ std::vector<Eigen::Vector3d> block_at(const Eigen::Vector3d& lower) {
   return points;
 }
 
-/// The largest error of single queries and of blocks around the same places.
+/// The largest error of single queries, and of queries in blocks around the same points.
 double largest_error(const Soup& soup, std::span<const Eigen::Vector3d> places) {
   const TriangleTree tree(soup.points, soup.triangles, 1.0);
   const WindingNumber fast(tree);
@@ -130,7 +133,7 @@ TEST(WindingNumber, OfNothingIsZero) {
 }
 
 TEST(WindingNumber, OfAHemisphereOnItsAxis) {
-  // From height z its rim is seen under the solid angle 2π(1 − z/√(z² + r²)), which is what is missing.
+  // From height z its rim is seen under the solid angle 2π(1 − z/√(z² + r²)), the missing part.
   Soup half = icosphere(10, 5);
   std::erase_if(half.triangles, [&](const Triangle& t) {
     return half.points[t[0]][2] + half.points[t[1]][2] + half.points[t[2]][2] < 0;
@@ -246,5 +249,5 @@ TEST(WindingNumber, IsTheSameAtAnyLevelOfVectorCode) {
   unsetenv("HERMESH_SIMD");
 }
 
-}  // namespace
+}  // namespace winding_number_test
 }  // namespace hermesh

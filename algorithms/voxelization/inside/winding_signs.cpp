@@ -1,5 +1,3 @@
-#include "algorithms/voxelization/inside/winding_signs.h"
-
 #include <tbb/parallel_for.h>
 
 #include <Eigen/Core>
@@ -7,43 +5,40 @@
 #include <cmath>
 #include <map>
 #include <memory>
+#include <numeric>
+#include <set>
 
 #include "algorithms/core/parallel.h"
 #include "algorithms/lattice/sample_side.h"
+#include "algorithms/voxelization/inside/signs.h"
+#include "algorithms/voxelization/inside/winding_number.h"
 
 namespace hermesh {
 namespace {
 
-/// Components whose winding number is this near ½ have every voxel asked. The number of a component beside a
-/// closed surface is whole but for 0.01, so that only holes are within.
+/// All voxels of a component are evaluated if its winding number is this near ½. The number of a component
+/// next to a closed surface is whole except for 0.01, so that only holes are within.
 constexpr float kDoubt = 0.25f;
-/// Voxels whose number is this near ½, twice its error, are asked once more.
+/// Voxels whose number is this near ½, twice its error, are evaluated more finely.
 constexpr float kError = 0.02f;
 
-/// Samples this near to a triangle, in voxels, are asked about one by one.
+/// Samples this near to a triangle, in voxels, are evaluated one by one.
 constexpr double kOnSurface = 1e-4;
-/// All places of a block, 0 to 511.
+/// All indices of a block, 0 to 511.
 constexpr std::array<unsigned, 512> kAllPlaces = [] {
   std::array<unsigned, 512> places{};
-  for (unsigned i = 0; i < 512; ++i) places[i] = i;
+  std::iota(places.begin(), places.end(), 0u);
   return places;
 }();
 
 using Samples = std::array<float, 512>;  ///< winding numbers of a block, in OpenVDB's order
 
-unsigned first_voxel(const BlockMask& bits) {
-  for (unsigned x = 0; x < 8; ++x)
-    if (bits[x]) return x << 6 | unsigned(__builtin_ctzll(bits[x]));
-  return 0;
-}
-
-/// The place whose side a voxel has, in voxels.
+/// Returns the point whose side a voxel has, in voxels.
 Eigen::Vector3d voxel_at(const BlockAt& block, unsigned place) {
-  return side_place(block[0] * 8.0 + double(place >> 6), block[1] * 8.0 + double(place >> 3 & 7),
-                    block[2] * 8.0 + double(place & 7));
+  return side_place(voxel_in(block, int(place)));
 }
 
-/// A block every voxel of which was asked, with its winding numbers and the sides that they give.
+/// A block all voxels of which were evaluated, with its winding numbers and their sides.
 struct Asked {
   std::unique_ptr<Samples> winding;
   BlockMask inside;
@@ -59,8 +54,9 @@ class WindingSigns {
   /// `rings`: how many blocks away from a cap its distance matters.
   Signs run(int rings) {
     ask_components();
-    // From the rims of holes the surface of ½ is followed block by block, until it ends at triangles. All
-    // blocks of a round are known before the next, so that the threads' order changes nothing.
+    // From the boundaries of holes the surface of ½ is followed block by block, until it ends at triangles.
+    // All blocks of a round are known before the next, so that the result does not depend on the thread
+    // schedule.
     std::vector<BlockAt> doubtful = doubtful_blocks();
     while (!doubtful.empty()) {
       ask(doubtful);
@@ -75,17 +71,17 @@ class WindingSigns {
   }
 
  private:
-  /// Finds the voxel of a component that is farthest from the triangles, where the number is least in doubt.
+  /// Returns the voxel of a component that is farthest from the triangles, where the number is most certain.
   unsigned representative(std::size_t block, const BlockMask& voxels) const {
-    unsigned best = first_voxel(voxels);
-    if (!band_.leaves[block]) return best;
-    const float* distance = band_.leaves[block]->buffer().data();
-    for (unsigned place = 0; place < 512; ++place)
-      if (test(voxels, int(place)) && distance[place] > distance[best]) best = place;
-    return best;
+    const float* distance = distances_of(std::uint32_t(block));
+    int best = -1;
+    for_each_bit(voxels, [&](int v) {
+      if (best < 0 || (distance && distance[v] > distance[best])) best = v;
+    });
+    return unsigned(best);
   }
 
-  /// Asks once for each component: without a triangle between, all its voxels have nearly the same number.
+  /// Evaluates each component once: without a triangle between, all its voxels have nearly the same number.
   void ask_components() {
     value_.resize(regions_.components.size());
     parallel_blocks(band_.blocks.size(), context_, [&](std::size_t i) {
@@ -105,21 +101,16 @@ class WindingSigns {
   bool sure(std::uint32_t component) const { return std::abs(value_[component] - 0.5f) > kDoubt; }
   bool side(std::uint32_t component) const { return value_[component] > 0.5f; }
 
-  /// Whether a component of a block is on both sides of a triangle, as it is around the rim of a hole: the
-  /// number changes within the component, which is in doubt whatever its one voxel says.
+  /// Returns true if a component of a block is on both sides of a triangle, as around the boundary of a hole:
+  /// the number changes within the component, so that one voxel does not represent it.
   bool goes_round(std::uint32_t block, std::uint32_t component) const {
     const BlockMask& voxels = regions_.components[component].voxels;
-    const auto& crossed = band_.crossed[block].word;
-    for (std::size_t x = 0; x < 8; ++x) {
-      const std::uint64_t v = voxels[x];
-      if ((crossed[0][x] & v & (x < 7 ? voxels[x + 1] : 0)) || (crossed[1][x] & v & v >> 8 & kBelowTopY) ||
-          (crossed[2][x] & v & v >> 1 & kBelowTopZ))
-        return true;
-    }
+    for (int axis = 0; axis < 3; ++axis)
+      if (any(crossed_along(block, axis) & voxels & upper_neighbours(voxels, kAllOutside, axis))) return true;
     return false;
   }
 
-  /// Lists the blocks with a component in doubt, or next to one on the other side although no triangle is
+  /// Returns the blocks with a component in doubt, or next to one on the other side without a triangle
   /// between.
   std::vector<BlockAt> doubtful_blocks() const {
     std::vector<char> doubtful(band_.blocks.size(), 0);
@@ -140,12 +131,10 @@ class WindingSigns {
     return result;
   }
 
-  /// Whether components of two neighbouring blocks are on different sides and connected across the face
-  /// between.
+  /// Returns true if components of two neighbouring blocks are on different sides and connected across the
+  /// face between.
   bool disagree(std::uint32_t lower, std::uint32_t upper, int axis) const {
-    BlockMask crossed;
-    for (std::size_t x = 0; x < 8; ++x) crossed[x] = band_.crossed[lower].word[axis][x];
-    const std::uint64_t open = ~face(crossed, axis, 1);
+    const std::uint64_t open = ~face(crossed_along(lower, axis), axis, 1);
     for (std::uint32_t a = regions_.first[lower]; a < regions_.first[lower + 1]; ++a)
       for (std::uint32_t b = regions_.first[upper]; b < regions_.first[upper + 1]; ++b)
         if (side(a) != side(b) && (open & face(regions_.components[a].voxels, axis, 1) &
@@ -154,8 +143,8 @@ class WindingSigns {
     return false;
   }
 
-  /// Asks once more about each sample that is so close to a triangle that the single precision of many points
-  /// together does not tell its side.
+  /// Evaluates again each sample so close to a triangle that the single precision of a batch cannot decide
+  /// its side.
   void ask_singly(const float* distances, std::span<const unsigned> places,
                   std::span<const Eigen::Vector3d> points, std::span<float> values) const {
     if (!distances) return;
@@ -169,7 +158,7 @@ class WindingSigns {
     return block != BlockTable::kNone && band_.leaves[block] ? band_.leaves[block]->buffer().data() : nullptr;
   }
 
-  /// Asks more finely about the voxels whose side the error of the first answer could have turned.
+  /// Evaluates more finely the voxels whose side may be wrong by the error of the first result.
   void ask_again(const BlockAt& block, Samples& values) const {
     std::vector<Eigen::Vector3d> points;
     std::vector<unsigned> places;
@@ -183,7 +172,7 @@ class WindingSigns {
     for (std::size_t i = 0; i < places.size(); ++i) values[places[i]] = again[i];
   }
 
-  /// Asks for every voxel of the blocks. Threads write to `found`, and one thread fills the map.
+  /// Evaluates every voxel of the blocks. Threads write to `found`, and one thread fills the map.
   void ask(const std::vector<BlockAt>& blocks) {
     std::vector<Asked> found(blocks.size());
     tbb::parallel_for(std::size_t(0), blocks.size(), [&](std::size_t i) {
@@ -200,11 +189,11 @@ class WindingSigns {
     for (std::size_t i = 0; i < blocks.size(); ++i) asked_.emplace(blocks[i], std::move(found[i]));
   }
 
-  /// Finds the neighbours, not asked yet, that the surface of ½ leads to from the blocks asked last: across a
-  /// side of the block on which the sign changes without a triangle, or where the neighbour is believed to be
-  /// on the other side. The map gives them in ascending order.
+  /// Returns the neighbours, not evaluated yet, that the surface of ½ leads to from the last blocks: across a
+  /// side of the block on which the sign changes without a triangle, or if the neighbour has been on the
+  /// other side so far. In ascending order.
   std::vector<BlockAt> next_blocks(const std::vector<BlockAt>& from) const {
-    std::map<BlockAt, int> next;
+    std::set<BlockAt> next;
     for (const BlockAt& block : from) {
       context_.check();
       const BlockMask& inside = asked_.at(block).inside;
@@ -216,44 +205,38 @@ class WindingSigns {
           const std::uint64_t ours = face(inside, axis, side);
           if (table_.find(at) == BlockTable::kNone ? ours != 0 && ours != ~0ull
                                                    : leads_to(block, at, axis, side))
-            next.emplace(at, 0);
+            next.insert(at);
         }
     }
-    std::vector<BlockAt> result;
-    for (const auto& entry : next) result.push_back(entry.first);
-    return result;
+    return {next.begin(), next.end()};
   }
 
-  /// Whether two samples on either side of a face differ without a triangle between.
+  /// Returns true if two samples on either side of a face differ without a triangle between.
   bool leads_to(const BlockAt& block, const BlockAt& at, int axis, int side) const {
     const BlockAt& lower = side ? block : at;
-    const BlockMask crossed = crossed_along(lower, axis);
     const BlockMask a = inside_of(lower), b = inside_of(side ? at : block);
-    return ((face(a, axis, 1) ^ face(b, axis, 0)) & ~face(crossed, axis, 1)) != 0;
+    return ((face(a, axis, 1) ^ face(b, axis, 0)) &
+            ~face(crossed_along(table_.find(lower), axis), axis, 1)) != 0;
   }
 
-  BlockMask crossed_along(const BlockAt& block, int axis) const {
-    BlockMask bits{};
-    const std::uint32_t i = table_.find(block);
-    if (i != BlockTable::kNone)
-      for (std::size_t x = 0; x < 8; ++x) bits[x] = band_.crossed[i].word[axis][x];
-    return bits;
+  /// Returns the crossed edges of a block; none for kNone.
+  BlockMask crossed_along(std::uint32_t block, int axis) const {
+    return block == BlockTable::kNone ? kAllOutside : std::to_array(band_.crossed[block].word[axis]);
   }
 
-  /// What is known of a block's sides so far: voxel by voxel if it was asked, else by its components.
+  /// Returns the current sides of a block: by voxel if these were evaluated, else by its components.
   BlockMask inside_of(const BlockAt& block) const {
     if (const auto asked = asked_.find(block); asked != asked_.end()) return asked->second.inside;
     BlockMask bits{};
     const std::uint32_t i = table_.find(block);
     if (i == BlockTable::kNone) return bits;
     for (std::uint32_t c = regions_.first[i]; c < regions_.first[i + 1]; ++c)
-      if (side(c))
-        for (std::size_t x = 0; x < 8; ++x) bits[x] |= regions_.components[c].voxels[x];
+      if (side(c)) bits |= regions_.components[c].voxels;
     return bits;
   }
 
   // ---- Caps: the dual of the grid edges on which the number passes ½ and no triangle is, a quad an edge,
-  // its corners the means of what crosses the cells around it (surface nets, Gibson 1998).
+  // its corners the means of the crossings of the cells around it (surface nets, Gibson 1998).
 
   /// The crossings of a cell's edges, whose mean is the cap's vertex there.
   struct Cell {
@@ -262,12 +245,12 @@ class WindingSigns {
   };
   /// An edge that passes ½, by its lower sample.
   struct CapEdge {
-    std::array<std::int32_t, 3> lower;
+    Voxel lower;
     int axis;
   };
-  using Cells = std::map<std::array<std::int32_t, 3>, Cell>;
+  using Cells = std::map<Voxel, Cell>;
 
-  /// Whether a voxel lies on a triangle, whose border a hole may begin at.
+  /// Returns true if a voxel lies on a triangle.
   bool on_surface(const BlockAt& block, unsigned place) const {
     constexpr double kOn = 1e-3;
     const float* distances = distances_of(table_.find(block));
@@ -287,14 +270,15 @@ class WindingSigns {
       BlockAt above = block;
       ++above[std::size_t(axis)];
       const auto upper = asked_.find(above);
-      BlockMask changes =
-          differs_from_upper(asked.inside, upper == asked_.end() ? BlockMask{} : upper->second.inside, axis);
-      const BlockMask crossed = crossed_along(block, axis);
+      const BlockMask above_it =
+          upper_neighbours(asked.inside, upper == asked_.end() ? kAllOutside : upper->second.inside, axis);
+      const BlockMask crossed = crossed_along(table_.find(block), axis);
       for (unsigned place = 0; place < 512; ++place) {
-        if (!test(changes, int(place)) || test(crossed, int(place))) continue;
+        if (test(asked.inside, int(place)) == test(above_it, int(place)) || test(crossed, int(place)))
+          continue;
         const unsigned stride = axis == 0 ? 64 : axis == 1 ? 8 : 1;
         const bool last = (place / stride) % 8 == 7;
-        // Beyond what was asked nothing changes but at triangles.
+        // Beyond the evaluated blocks the number changes only at triangles.
         if (last && upper == asked_.end()) continue;
         // The number jumps at a triangle by 1, and passes ½ there without being a cap.
         if (on_surface(block, place) ||
@@ -304,14 +288,11 @@ class WindingSigns {
         const float to =
             last ? (*upper->second.winding)[place - 7 * stride] : (*asked.winding)[place + stride];
         Eigen::Vector3d crossing = voxel_at(block, place);
-        CapEdge edge{{}, axis};
-        // Windings are taken a few millionths of a voxel beside the samples (SampleSide), on either side of
-        // whole numbers.
-        for (int a = 0; a < 3; ++a) edge.lower[std::size_t(a)] = std::int32_t(std::lround(crossing[a]));
+        const CapEdge edge{voxel_in(block, int(place)), axis};
         // Linear between the two numbers, as a level set's crossing is.
         crossing[axis] += std::clamp((0.5 - double(from)) / (double(to) - double(from)), 0.0, 1.0);
         edges.push_back(edge);
-        for_each_cell(edge, [&](const std::array<std::int32_t, 3>& cell) {
+        for_each_cell(edge, [&](const Voxel& cell) {
           Cell& c = cells[cell];
           c.sum += crossing;
           ++c.count;
@@ -325,7 +306,7 @@ class WindingSigns {
   static void for_each_cell(const CapEdge& edge, F&& f) {
     const std::size_t u = std::size_t(edge.axis + 1) % 3, v = std::size_t(edge.axis + 2) % 3;
     for (const auto& [du, dv] : {std::pair(-1, -1), std::pair(0, -1), std::pair(0, 0), std::pair(-1, 0)}) {
-      std::array<std::int32_t, 3> cell = edge.lower;
+      Voxel cell = edge.lower;
       cell[u] += du;
       cell[v] += dv;
       f(cell);
@@ -335,20 +316,18 @@ class WindingSigns {
   static void add_quad(const CapEdge& edge, const Cells& cells, std::vector<TriangleCorners>& caps) {
     std::array<Eigen::Vector3d, 4> corner;
     std::size_t n = 0;
-    for_each_cell(edge, [&](const std::array<std::int32_t, 3>& cell) {
+    for_each_cell(edge, [&](const Voxel& cell) {
       const Cell& c = cells.at(cell);
       corner[n++] = c.sum / c.count;
     });
-    for (const auto& triangle : {std::array<std::size_t, 3>{0, 1, 2}, std::array<std::size_t, 3>{0, 2, 3}}) {
-      TriangleCorners corners;
-      for (std::size_t i = 0; i < 3; ++i)
-        for (std::size_t a = 0; a < 3; ++a) corners[3 * i + a] = corner[triangle[i]][Eigen::Index(a)];
-      caps.push_back(corners);
+    for (const auto& triangle : {std::array{0, 1, 2}, std::array{0, 2, 3}}) {
+      TriangleCorners& corners = caps.emplace_back();
+      for (int i = 0; i < 3; ++i) Eigen::Vector3d::Map(&corners[3 * i]) = corner[triangle[i]];
     }
   }
 
-  /// Signs the blocks around those that were asked, which distances to caps reach: each is on one side of the
-  /// surface as a whole unless it was asked itself, so that one of its voxels speaks for all.
+  /// Signs the blocks around the evaluated ones, which distances to caps reach: each that was not evaluated
+  /// itself is on one side of the surface, so that one of its voxels represents all.
   void sign_beyond(int rings, std::map<BlockAt, BlockMask>& beyond) const {
     for (const auto& [block, asked] : asked_) {
       context_.check();

@@ -7,11 +7,12 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <numeric>
 #include <vector>
 
 #include "algorithms/core/level_set_grid.h"
 #include "algorithms/search/triangle_tree.h"
-#include "algorithms/voxelization/distance/segment.h"
+#include "algorithms/voxelization/distance/index_soup.h"
 #include "algorithms/voxelization/hermesh_voxelizer.h"
 
 namespace hermesh {
@@ -19,21 +20,20 @@ namespace {
 
 using Eigen::Vector3d;
 
-constexpr double kMostPlaces = 200'000;          ///< where every triangle is larger than its share
-constexpr std::size_t kMostProbes = 20'000;      ///< lost places whose thickness is measured
-constexpr std::size_t kTrianglesPerTask = 4096;  ///< triangles to a task
-constexpr double kReach = 2.0;                   ///< voxels: how far an opposite wall is looked for
-constexpr double kOff = 1e-4;                    ///< voxels: where the way to it begins
-constexpr double kSameDistance =
-    1e-3;                         ///< voxels: up to here a sample's distance is that to the place's polygon
-constexpr double kNoWall = 1e-3;  ///< voxels: what is thinner is no wall to be kept
+constexpr double kMostPlaces = 200'000;      ///< if every triangle is larger than its share
+constexpr std::size_t kMostProbes = 20'000;  ///< lost points whose thickness is measured
+constexpr std::size_t kTrianglesPerTask = 4096;
+constexpr double kReach = 2.0;          ///< voxels: the largest distance of an opposite wall
+constexpr double kOff = 1e-4;           ///< voxels: start of the segment to it
+constexpr double kSameDistance = 1e-3;  ///< voxels: tolerance of a sample's distance to the point's polygon
+constexpr double kNoWall = 1e-3;        ///< voxels: the least thickness of a wall that could be preserved
 
-/// A place of the surface without a change of sign around it.
+/// A point of the surface without a change of sign around it.
 struct LostPlace {
   Vector3d at, normal;  ///< voxels; of unit length
 };
 
-/// What a part of the triangles came to.
+/// The result for a part of the triangles.
 struct Part {
   double area = 0.0, lost_area = 0.0;  ///< voxels²
   std::vector<LostPlace> places;
@@ -57,7 +57,7 @@ class Search {
   }
 
   LostSurface run() {
-    // Area that a place stands for: a voxel², or more of a surface so large that there would be too many.
+    // The area that a point represents: a voxel², or more if there would be too many points.
     const double share = std::max(1.0, total_area() / kMostPlaces);
     std::vector<Part> parts((triangles_.size() + kTrianglesPerTask - 1) / kTrianglesPerTask);
     tbb::parallel_for(std::size_t(0), parts.size(), [&](std::size_t i) {
@@ -68,8 +68,7 @@ class Search {
         look(Facet(corner(t, 0), corner(t, 1), corner(t, 2)), share, samples, parts[i]);
     });
     LostSurface result;
-    // One thread adds up the parts in their order, which the size of the mesh alone decides: the sums are the
-    // same at any thread count.
+    // One thread adds up the parts of fixed size: the sums are the same at any thread count.
     std::vector<LostPlace> places;
     for (const Part& part : parts) {
       result.area += part.area * voxel_size_ * voxel_size_;
@@ -83,30 +82,27 @@ class Search {
  private:
   using Samples = openvdb::FloatGrid::ConstUnsafeAccessor;
 
-  /// A corner in voxels of the grid, whose placement need not be the mesh's own.
+  /// Returns a corner in voxels of the grid.
   Vector3d corner(std::size_t triangle, std::size_t i) const {
     return origin_ + scale_ * mesh_.points[triangles_[triangle][i]].cast<double>();
   }
 
-  /// Area of the mesh in voxels², by parts of a fixed size.
+  /// Returns the area of the mesh in voxels², summed by parts of a fixed size.
   double total_area() const {
     std::vector<double> area((triangles_.size() + kTrianglesPerTask - 1) / kTrianglesPerTask, 0.0);
     tbb::parallel_for(std::size_t(0), area.size(), [&](std::size_t i) {
       for (std::size_t t = i * kTrianglesPerTask;
            t < std::min(triangles_.size(), (i + 1) * kTrianglesPerTask); ++t) {
-        const Triangle& corners = triangles_[t];
-        const Vector3d a = mesh_.points[corners[0]].cast<double>(),
-                       b = mesh_.points[corners[1]].cast<double>(),
-                       c = mesh_.points[corners[2]].cast<double>();
-        area[i] += 0.5 * (b - a).cross(c - a).norm();
+        const auto [a, b, c] = triangles_[t];
+        const Facet facet(mesh_.points[a].cast<double>(), mesh_.points[b].cast<double>(),
+                          mesh_.points[c].cast<double>());
+        area[i] += 0.5 * facet.normal().norm();
       }
     });
-    double sum = 0.0;
-    for (const double part : area) sum += part;
-    return sum / (voxel_size_ * voxel_size_);
+    return std::accumulate(area.begin(), area.end(), 0.0) / (voxel_size_ * voxel_size_);
   }
 
-  /// Looks at places of a triangle: its middle, or the points of Roberts' sequence R2, which fill it evenly
+  /// Classifies points of a triangle: its middle, or the points of Roberts' sequence R2, which fill it evenly
   /// whatever their number.
   void look(const Facet& facet, double share, Samples& samples, Part& part) const {
     const Vector3d normal = facet.normal();
@@ -133,19 +129,15 @@ class Search {
     }
   }
 
-  /// What a place is: shown by the level set, lost, or within the solid.
+  /// A point is shown by the level set, lost, or within the solid.
   enum class Verdict { kept, lost, inner };
 
-  /// Whether the leaf that holds a cell's first corner holds all of them.
-  static bool is_in_one_leaf(const openvdb::Coord& cell) {
-    return (cell.x() & 7) != 7 && (cell.y() & 7) != 7 && (cell.z() & 7) != 7;
-  }
-
-  /// Tells what a place is by the samples of its cell and of the ring of cells around it.
+  /// Classifies a point by the samples of its cell and of the ring of cells around it.
   Verdict look_around(const Vector3d& at, Samples& samples) const {
     const openvdb::Coord cell(int(std::floor(at.x())), int(std::floor(at.y())), int(std::floor(at.z())));
-    // All but a third of the cells have their corners in one leaf.
-    if (const auto* leaf = samples.probeConstLeaf(cell); leaf && is_in_one_leaf(cell)) {
+    // Two thirds of the cells have their corners in one leaf.
+    const bool is_in_one_leaf = (cell.x() & 7) != 7 && (cell.y() & 7) != 7 && (cell.z() & 7) != 7;
+    if (const auto* leaf = samples.probeConstLeaf(cell); leaf && is_in_one_leaf) {
       const float* values = leaf->buffer().data() + leaf->coordToOffset(cell);
       const bool inside = values[0] < 0.0f;
       for (const int next : {1, 8, 9, 64, 65, 72, 73})
@@ -159,11 +151,11 @@ class Search {
             if ((samples.getValue(cell.offsetBy(x, y, z)) < 0.0f) != inside) return true;
       return false;
     };
-    // Samples −1 to 2 on each axis hold all that are within a voxel of the place.
+    // Samples −1 to 2 on each axis include all within a voxel of the point.
     if (differs(0, 1) || differs(-1, 2)) return Verdict::kept;
     if (!inside) return Verdict::lost;
     if (!boundary_distances_) return Verdict::inner;
-    // A sample cannot be deeper than the place is away, if the polygon bounds the solid.
+    // No sample is deeper than its distance to the point, if the polygon bounds the solid.
     for (int i = 0; i < 8; ++i) {
       const openvdb::Coord sample = cell.offsetBy(i & 1, i >> 1 & 1, i >> 2);
       const double away = (Vector3d(sample.x(), sample.y(), sample.z()) - at).norm();
@@ -172,7 +164,7 @@ class Search {
     return Verdict::lost;
   }
 
-  /// Measures the gaps at an even share of the lost places, and keeps the least.
+  /// Measures the gaps at an even share of the lost points, and stores the least.
   void find_thinnest(const std::vector<LostPlace>& places, LostSurface& result) const {
     const std::size_t step = (places.size() + kMostProbes - 1) / kMostProbes;
     std::vector<LostPlace> probes;
@@ -182,11 +174,11 @@ class Search {
     std::vector<double> thickness(probes.size(), kReach);
     tbb::parallel_for(std::size_t(0), probes.size(), [&](std::size_t i) {
       context_.check();
-      // A wall's other side is behind the place, a gap's before it.
+      // A wall's other side is behind the point, a gap's in front of it.
       for (const double side : {-1.0, 1.0})
         thickness[i] = std::min(thickness[i], gap(tree, probes[i].at - origin_, side * probes[i].normal));
     });
-    // The first of equal ones, so that threads have no say.
+    // The first of equal ones, independent of the thread schedule.
     const auto least = std::min_element(thickness.begin(), thickness.end());
     if (*least >= kReach) return;
     const Vector3d& at = probes[std::size_t(least - thickness.begin())].at;
@@ -195,11 +187,11 @@ class Search {
     result.thickness = *least * voxel_size_;
   }
 
-  /// Selects the triangles that may be within reach of one of the places: a tree of all of them would take
-  /// longer than the search where little is lost.
+  /// Returns the triangles that may be within reach of one of the points: a tree of all triangles would take
+  /// longer than the search if little is lost.
   std::vector<Triangle> triangles_about(const std::vector<LostPlace>& places) const {
-    // Cells as long as the reach: what is within reach of a place and no longer than it has all of its
-    // corners within two cells of the place's.
+    // Cells as long as the reach: a triangle within reach of a point, and no longer than the reach, has all
+    // corners within two cells of the point's.
     const auto cell_of = [](const Vector3d& at) {
       return openvdb::Coord(int(std::floor(at.x() / kReach)), int(std::floor(at.y() / kReach)),
                             int(std::floor(at.z() / kReach)));
@@ -220,18 +212,18 @@ class Search {
     const auto longest = static_cast<float>(kReach * voxel_size_);
     for (const Triangle& t : triangles_) {
       const Eigen::Vector3f &a = mesh_.points[t[0]], &b = mesh_.points[t[1]], &c = mesh_.points[t[2]];
-      // A triangle longer than a cell may come near a place with all corners far from it.
+      // A triangle longer than a cell may be near a point with all corners far from it.
       const bool is_long = (a.cwiseMax(b).cwiseMax(c) - a.cwiseMin(b).cwiseMin(c)).maxCoeff() > longest;
       if (near[t[0]] | near[t[1]] | near[t[2]] | is_long) result.push_back(t);
     }
     return result;
   }
 
-  /// The distance in voxels from the place along a unit vector to the next triangle, at most kReach. It
-  /// begins a little off the place, so that the place's own triangle does not count.
+  /// Returns the distance in voxels from the point along a unit vector to the next triangle, at most kReach.
+  /// Starts a little off the point, so that its own triangle does not count.
   static double gap(const TriangleTree& tree, const Vector3d& place, const Vector3d& along) {
     const Vector3d from = place + kOff * along, to = place + kReach * along;
-    constexpr double kMargin = 1e-6;  // beyond what the boxes of slabs in a plane of samples are rounded by
+    constexpr double kMargin = 1e-6;  // above the rounding of the boxes
     double nearest = 1.0;
     tree.for_each_near(
         from.cwiseMin(to).array() - kMargin, from.cwiseMax(to).array() + kMargin, [&](std::uint32_t t) {
@@ -261,7 +253,7 @@ std::string short_text(double value) {
 
 LostSurface find_lost_surface(const PolygonMesh& mesh, const LevelSet& level_set,
                               bool distances_are_to_the_boundary, const RunContext& context) {
-  // Distances without sign, and fog, have no change of sign to look for.
+  // Distances without sign, and fog, have no changes of sign.
   if (mesh.triangle_count() == 0 || level_set.grid().grid->getGridClass() != openvdb::GRID_LEVEL_SET)
     return {};
   return Search(mesh, level_set, distances_are_to_the_boundary, context).run();
@@ -278,12 +270,21 @@ std::string lost_surface_note(const LostSurface& lost, double voxel_size) {
   note += "; the thinnest place found is " + short_text(lost.thickness) + " thick, at (" +
           short_text(lost.thinnest_at.x()) + ", " + short_text(lost.thinnest_at.y()) + ", " +
           short_text(lost.thinnest_at.z()) + ")";
-  // Where polygons all but touch, as at the tips of needles, no size that anybody would use keeps them apart.
+  // Where polygons nearly touch, as at the tips of needles, no practical voxel size separates them.
   if (lost.thickness < kNoWall * voxel_size) return note;
-  // Rounded down, for a wall exactly a voxel thick is the thinnest that is kept.
+  // Rounded down, for a wall exactly a voxel thick is the thinnest that is preserved.
   const double digit = std::pow(10.0, std::floor(std::log10(lost.thickness)) - 2.0);
   return note + ", and voxels of " + short_text(std::floor(lost.thickness / digit) * digit) +
          " would keep it";
+}
+
+void note_lost_surface(const PolygonMesh& mesh, const LevelSet& level_set, const Voxelizer& voxelizer,
+                       RunContext& context) {
+  const LostSurface lost = find_lost_surface(mesh, level_set, leaves_out_inner_polygons(voxelizer), context);
+  context.figure("lost_surface_share", lost.share());
+  context.figure("lost_surface_thickness", lost.thickness);
+  const std::string note = lost_surface_note(lost, level_set.voxel_size());
+  if (!note.empty()) context.note(note);
 }
 
 }  // namespace hermesh

@@ -2,21 +2,12 @@
 
 #include <gtest/gtest.h>
 
-#include "algorithms/core/level_set_grid.h"
-#include "algorithms/voxelization/voxelize.h"
+#include "algorithms/voxelization/voxelize_for_tests.h"
 
 namespace hermesh {
-namespace {
+namespace lost_surface_test {
 
-void add_box(PolygonMesh& mesh, const Eigen::Vector3f& low, const Eigen::Vector3f& high) {
-  const auto n = std::uint32_t(mesh.points.size());
-  for (unsigned i = 0; i < 8; ++i)
-    mesh.points.push_back(
-        {i & 1 ? high.x() : low.x(), i & 2 ? high.y() : low.y(), i & 4 ? high.z() : low.z()});
-  for (const Quad& q : {Quad{0, 2, 3, 1}, Quad{4, 5, 7, 6}, Quad{0, 1, 5, 4}, Quad{2, 6, 7, 3},
-                        Quad{0, 4, 6, 2}, Quad{1, 3, 7, 5}})
-    mesh.quads.push_back({n + q[0], n + q[1], n + q[2], n + q[3]});
-}
+using namespace voxelize_for_tests;
 
 LostSurface lost_of(const PolygonMesh& mesh, double voxel_size) {
   RunContext context;
@@ -26,8 +17,7 @@ LostSurface lost_of(const PolygonMesh& mesh, double voxel_size) {
 }
 
 TEST(LostSurface, NothingIsLostOfSolidsThickerThanAVoxel) {
-  PolygonMesh mesh;
-  add_box(mesh, {0.3f, 0.3f, 0.3f}, {8.3f, 7.7f, 1.4f});
+  PolygonMesh mesh = box({0.3, 0.3, 0.3}, {8.3, 7.7, 1.4});
   const LostSurface lost = lost_of(mesh, 1.0);
   EXPECT_EQ(lost.lost_area, 0.0);
   EXPECT_NEAR(lost.area, 2 * (8.0 * 7.4 + 8.0 * 1.1 + 7.4 * 1.1), 1e-3);
@@ -35,11 +25,11 @@ TEST(LostSurface, NothingIsLostOfSolidsThickerThanAVoxel) {
 }
 
 TEST(LostSurface, AFinBetweenSamplesIsLost) {
-  PolygonMesh mesh;
-  add_box(mesh, {0.5f, 0.5f, 0.5f}, {10.5f, 10.5f, 10.5f});
-  add_box(mesh, {8.5f, 1.5f, 4.3f}, {40.5f, 9.5f, 4.7f});
+  PolygonMesh mesh = box({0.5, 0.5, 0.5}, {10.5, 10.5, 10.5});
+  append(mesh, box({8.5, 1.5, 4.3}, {40.5, 9.5, 4.7}));
   const LostSurface lost = lost_of(mesh, 1.0);
-  // From x = 10.5 on, its two sides and its edges; what is within a voxel of the body has the body's surface.
+  // From x = 10.5 on, its two sides and its edges; the part within a voxel of the body has the body's
+  // surface.
   const double fin = 2 * 30.0 * 8.0 + 2 * 30.0 * 0.4 + 8.0 * 0.4;
   // The root of the fin counts as far as it is within a voxel of the body's surface.
   EXPECT_NEAR(lost.area, 600.0 - 8.0 * 0.4 + fin, 50.0);
@@ -52,9 +42,8 @@ TEST(LostSurface, AFinBetweenSamplesIsLost) {
 }
 
 TEST(LostSurface, AGapBetweenSamplesIsLost) {
-  PolygonMesh mesh;
-  add_box(mesh, {0.5f, 0.5f, 0.5f}, {20.5f, 20.5f, 8.3f});
-  add_box(mesh, {0.5f, 0.5f, 8.7f}, {20.5f, 20.5f, 16.5f});
+  PolygonMesh mesh = box({0.5, 0.5, 0.5}, {20.5, 20.5, 8.3});
+  append(mesh, box({0.5, 0.5, 8.7}, {20.5, 20.5, 16.5}));
   const LostSurface lost = lost_of(mesh, 1.0);
   EXPECT_LT(lost.lost_area, 2 * 400.0);
   EXPECT_GT(lost.lost_area, 2 * 16.0 * 16.0);
@@ -63,9 +52,8 @@ TEST(LostSurface, AGapBetweenSamplesIsLost) {
 
 /// The walls of the overlap bound nothing, so that nothing of the solid is lost with them.
 TEST(LostSurface, WallsWithinTheSolidDoNotCount) {
-  PolygonMesh mesh;
-  add_box(mesh, {0.0f, 0.0f, 0.0f}, {20.0f, 10.0f, 10.0f});
-  add_box(mesh, {15.0f, 0.0f, 0.0f}, {40.0f, 10.0f, 10.0f});
+  PolygonMesh mesh = box({0.0, 0.0, 0.0}, {20.0, 10.0, 10.0});
+  append(mesh, box({15.0, 0.0, 0.0}, {40.0, 10.0, 10.0}));
   const LostSurface lost = lost_of(mesh, 1.0);
   EXPECT_EQ(lost.lost_area, 0.0);
   // The sides of the overlap are there twice, and the walls within a voxel of the surface count.
@@ -73,5 +61,5 @@ TEST(LostSurface, WallsWithinTheSolidDoNotCount) {
   EXPECT_LE(lost.area, 1800.0 + 4 * 50.0 + 150.0);
 }
 
-}  // namespace
+}  // namespace lost_surface_test
 }  // namespace hermesh

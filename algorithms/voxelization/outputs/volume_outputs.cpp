@@ -3,20 +3,23 @@
 #include <openvdb/tools/ChangeBackground.h>
 #include <openvdb/tools/Prune.h>
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <memory>
 #include <sstream>
 
 #include "algorithms/core/level_set_grid.h"
 #include "algorithms/core/parallel.h"
-#include "algorithms/hermite/hermite_file.h"
 #include "algorithms/hermite/samplers.h"
 #include "algorithms/io/atomic_file.h"
 #include "algorithms/io/vdb_archive.h"
 #include "algorithms/lattice/memory_estimate.h"
 #include "algorithms/lattice/sample_side.h"
-#include "algorithms/voxelization/outputs/surface_transfer.h"
+#include "algorithms/search/triangle_point.h"
+#include "algorithms/thesis/voxels/hermite_file.h"
+#include "algorithms/voxelization/distance/index_soup.h"
 
 namespace hermesh {
 namespace {
@@ -26,8 +29,8 @@ constexpr const char* kNames =
 
 // ---- Volumes from the distances.
 
-/// Replaces every value, those of tiles and inactive ones included; `active` says which are active then. The
-/// leaves are for all threads, each leaf for one; the few tiles above them for the thread that calls.
+/// Replaces every value, including those of tiles and inactive ones; active(value, was_active) decides which
+/// are active then. Leaves are processed in parallel, the few tiles above them by the calling thread.
 template <class Map, class Active>
 void map_values(openvdb::FloatTree& tree, const RunContext& context, Map map, Active active) {
   std::vector<openvdb::FloatTree::LeafNodeType*> leaves;
@@ -51,21 +54,20 @@ void map_values(openvdb::FloatTree& tree, const RunContext& context, Map map, Ac
   }
 }
 
-/// Distances without sign, of a band that has signs. The background is positive already.
+/// Returns distances without sign, of a band with signs. The background is positive already.
 openvdb::FloatGrid::Ptr make_udf(const openvdb::FloatGrid& sdf, RunContext& context) {
   const Stage stage(context, "udf");
   const openvdb::FloatGrid::Ptr grid = sdf.deepCopy();
   map_values(
       grid->tree(), context, [](float distance) { return std::abs(distance); },
-      // What is near the surface is on both sides, so the same voxels stay active.
       [](float, bool on) { return on; });
   grid->setName("udf");
   grid->setGridClass(openvdb::GRID_UNKNOWN);  // programs take a level set to have signs
   return grid;
 }
 
-/// Fog (§5.6): 1 inside, and a linear ramp from 1 at the inner end of the band to 0 at the surface, or at the
-/// outer end of the band.
+/// Returns fog (§5.6): 1 inside, and a linear ramp from 1 at the inner end of the band to 0 at the surface,
+/// or at the outer end of the band.
 openvdb::FloatGrid::Ptr make_fog(const openvdb::FloatGrid& sdf, const VoxelizeOptions& options, bool exterior,
                                  RunContext& context) {
   const Stage stage(context, "fog");
@@ -76,15 +78,14 @@ openvdb::FloatGrid::Ptr make_fog(const openvdb::FloatGrid& sdf, const VoxelizeOp
   map_values(
       grid->tree(), context,
       [=](float distance) {
-        // Exactly 1 beyond the band, where division might leave a little less.
+        // Exactly 1 beyond the band, where division might give a little less.
         if (distance <= -inner) return 1.0f;
         if (distance < 0.0f && distance >= -on_surface)
           distance = 0.0f;  // a sample on the surface, which is no depth
         return std::clamp((outer - distance) / (outer + inner), 0.0f, 1.0f);
       },
       [](float density, bool) { return density > 0.0f; });
-  // The background was the exterior width, and inactive tiles of it are 0 by now; pruning makes tiles of
-  // leaves that are all 1 or all 0.
+  // Pruning makes tiles of leaves that are all 1 or all 0.
   openvdb::tools::changeBackground(grid->tree(), 0.0f);
   openvdb::tools::prune(grid->tree());
   grid->setName("fog");
@@ -92,8 +93,7 @@ openvdb::FloatGrid::Ptr make_fog(const openvdb::FloatGrid& sdf, const VoxelizeOp
   return grid;
 }
 
-/// The nearest triangles by the numbers that the user knows them by. A copy, for the other grids are made
-/// from triangulated()'s.
+/// Returns the nearest triangles with the user's numbers. A copy, for the other grids need triangulated()'s.
 openvdb::Int32Grid::Ptr make_triangle_id(const openvdb::Int32Grid::Ptr& nearest,
                                          const std::vector<std::uint32_t>& numbers, RunContext& context) {
   if (numbers.empty()) return nearest;
@@ -107,14 +107,233 @@ openvdb::Int32Grid::Ptr make_triangle_id(const openvdb::Int32Grid::Ptr& nearest,
   return grid;
 }
 
-/// Exact hits of the polygons on the grid's edges whose ends differ in sign.
-FloatHermite make_hermite(const openvdb::FloatGrid::Ptr& sdf, const PolygonMesh& mesh, RunContext& context) {
-  return sample_polygons(make_level_set(sdf), 0.0, mesh, context);
+// ---- Values from the surface.
+
+/// The closest point of one voxel.
+struct Foot {
+  std::uint32_t voxel;  ///< in its leaf
+  std::uint32_t triangle;
+  TrianglePoint point;  ///< relative to the mesh's origin
+};
+
+/// Reads one attribute at closest points.
+class AttributeSampler {
+ public:
+  AttributeSampler(const PolygonMesh& mesh, const MeshAttribute& attribute)
+      : mesh_(mesh), attribute_(attribute) {}
+
+  /// Returns a component, interpolated (Aldén 2011, §5.2: barycentric interpolation of the closest point).
+  double number(const Foot& foot, int component) const {
+    const auto& values = std::get<std::vector<float>>(attribute_.values);
+    const auto value = [&](int corner) {
+      return double(values[place(foot.triangle, corner) + std::size_t(component)]);
+    };
+    if (attribute_.domain == AttributeDomain::polygon) return value(0);
+    const Eigen::Vector3d& w = foot.point.weights;
+    return w[0] * value(0) + w[1] * value(1) + w[2] * value(2);
+  }
+  /// Returns the number of the nearest corner: between two materials there is no third.
+  std::int32_t whole(const Foot& foot) const {
+    int corner = 0;
+    foot.point.weights.maxCoeff(&corner);
+    return std::get<std::vector<std::int32_t>>(attribute_.values)[place(foot.triangle, corner)];
+  }
+  /// Returns the first three components, with 0 for those that are missing.
+  Eigen::Vector3d vector(const Foot& foot) const {
+    Eigen::Vector3d result = Eigen::Vector3d::Zero();
+    for (int i = 0; i < std::min(3, attribute_.components); ++i) result[i] = number(foot, i);
+    return result;
+  }
+  /// Returns a direction of unit length: the triangle's own if the normals of the corners cancel.
+  Eigen::Vector3d normal(const Foot& foot) const {
+    constexpr double kCancelled = 1e-6;
+    const Eigen::Vector3d sum = vector(foot);
+    return sum.norm() > kCancelled ? sum.normalized() : triangle_normal(foot.triangle);
+  }
+
+ private:
+  /// Returns the index of the first component of a corner's element in the array of values.
+  std::size_t place(std::uint32_t triangle, int corner) const {
+    return element(triangle, std::size_t(corner)) * std::size_t(attribute_.components);
+  }
+  /// Returns the number of the point, corner or polygon that has the values of a triangle's corner. Corners
+  /// and polygons are those of all triangles, then those of all quads.
+  std::size_t element(std::size_t triangle, std::size_t corner) const {
+    if (attribute_.domain == AttributeDomain::point) return IndexSoup(mesh_, 1.0).triangle(triangle)[corner];
+    const std::size_t triangles = mesh_.triangles.size();
+    const bool polygon = attribute_.domain == AttributeDomain::polygon;
+    if (triangle < triangles) return polygon ? triangle : 3 * triangle + corner;
+    // A quad (a,b,c,d) is the triangles abc and acd.
+    const std::size_t half = triangle - triangles, quad = half / 2;
+    if (polygon) return triangles + quad;
+    return 3 * triangles + 4 * quad + (half % 2 == 1 && corner > 0 ? corner + 1 : corner);
+  }
+  /// Returns the triangle's own unit normal, or zero if it has no area.
+  Eigen::Vector3d triangle_normal(std::uint32_t triangle) const {
+    const auto [a, b, c] = IndexSoup(mesh_, 1.0).triangle(triangle);
+    const auto point = [&](std::uint32_t i) { return Eigen::Vector3d(mesh_.points[i].cast<double>()); };
+    return (point(b) - point(a)).cross(point(c) - point(a)).normalized();  // zero stays zero
+  }
+
+  const PolygonMesh& mesh_;
+  const MeshAttribute& attribute_;
+};
+
+/// Closest points of a leaf's voxels, and the voxels without one.
+struct Feet {
+  std::vector<Foot> found;
+  std::vector<std::uint32_t> missing;
+};
+
+/// A grid over the voxels of the nearest triangles. Different leaves may be filled at the same time.
+struct Layer {
+  std::string name;
+  openvdb::GridBase::Ptr grid;
+  std::function<void(std::size_t leaf, const Feet&)> fill;  ///< a voxel without a triangle becomes inactive
+  std::function<void()> prune;                              ///< removes leaves without active voxels
+};
+
+/// Makes a layer from sample(foot), the value at a closest point.
+template <class Grid, class Sample>
+Layer make_layer(const std::string& name, const openvdb::Int32Grid& nearest,
+                 typename Grid::ValueType background, Sample sample) {
+  using Tree = typename Grid::TreeType;
+  // The topology is that of the triangles from the start, so that filling adds no node, and leaf i is the
+  // same block in all layers.
+  const auto grid = Grid::create(std::make_shared<Tree>(nearest.tree(), background, openvdb::TopologyCopy()));
+  grid->setTransform(nearest.transform().copy());
+  grid->setName(name);
+  std::vector<typename Tree::LeafNodeType*> leaves;
+  grid->tree().getNodes(leaves);
+  return {name, grid,
+          [leaves, sample, background](std::size_t leaf, const Feet& feet) {
+            for (const Foot& foot : feet.found) leaves[leaf]->setValueOnly(foot.voxel, sample(foot));
+            for (const std::uint32_t voxel : feet.missing) leaves[leaf]->setValueOff(voxel, background);
+          },
+          [grid] { openvdb::tools::pruneInactive(grid->tree()); }};
 }
 
-// ---- What is asked for.
+openvdb::Vec3d to_vec3d(const Eigen::Vector3d& v) { return {v.x(), v.y(), v.z()}; }
 
-/// The attributes asked for, in the order of the mesh, each once however often it is named.
+/// Returns the attribute's name, different from those of the voxelizer's own grids.
+std::string grid_name(const MeshAttribute& attribute) {
+  constexpr std::array names = {"sdf", "udf", "fog", "hermite", "closest-point", "triangle-id"};
+  return (std::ranges::find(names, attribute.name) != names.end() ? "attribute-" : "") + attribute.name;
+}
+
+/// Appends the grids of one attribute, two if it has four components: OpenVDB has no vector of four.
+void add_layers(const PolygonMesh& mesh, const MeshAttribute& attribute, const openvdb::Int32Grid& nearest,
+                std::vector<Layer>& layers) {
+  const AttributeSampler sampler(mesh, attribute);
+  const std::string name = grid_name(attribute);
+  const bool normal =
+      attribute.components == 3 && (attribute.name == "normal" || attribute.name.ends_with("-normal"));
+  const auto component = [&](const std::string& grid, int i) {
+    return make_layer<openvdb::FloatGrid>(
+        grid, nearest, 0.0f, [sampler, i](const Foot& foot) { return float(sampler.number(foot, i)); });
+  };
+  if (std::holds_alternative<std::vector<std::int32_t>>(attribute.values)) {
+    layers.push_back(make_layer<openvdb::Int32Grid>(
+        name, nearest, -1, [sampler](const Foot& foot) { return sampler.whole(foot); }));
+  } else if (attribute.components == 1) {
+    layers.push_back(component(name, 0));
+  } else {
+    layers.push_back(make_layer<openvdb::Vec3SGrid>(
+        name, nearest, openvdb::Vec3s(0.0f), [sampler, normal](const Foot& foot) {
+          return openvdb::Vec3s(to_vec3d(normal ? sampler.normal(foot) : sampler.vector(foot)));
+        }));
+  }
+  openvdb::GridBase& grid = *layers.back().grid;
+  grid.setVectorType(normal ? openvdb::VEC_COVARIANT_NORMALIZE : openvdb::VEC_INVARIANT);
+  grid.setIsInWorldSpace(normal);
+  for (std::size_t i = 0; i < attribute.labels.size(); ++i)
+    grid.insertMeta("label_" + std::to_string(i), openvdb::StringMetadata(attribute.labels[i]));
+  if (attribute.components != 4) return;
+  layers.push_back(component(name + "-alpha", 3));
+  layers.back().grid->setVectorType(openvdb::VEC_INVARIANT);
+  layers.back().grid->setIsInWorldSpace(false);
+}
+
+/// Throws Error for an attribute with a wrong number of values, or one that is not finite.
+void check_attribute(const PolygonMesh& mesh, const MeshAttribute& attribute) {
+  const std::size_t polygons = mesh.triangles.size() + mesh.quads.size(),
+                    corners = 3 * mesh.triangles.size() + 4 * mesh.quads.size();
+  const std::size_t elements = attribute.domain == AttributeDomain::point    ? mesh.points.size()
+                               : attribute.domain == AttributeDomain::corner ? corners
+                                                                             : polygons;
+  const std::size_t size = std::visit([](const auto& values) { return values.size(); }, attribute.values);
+  const bool whole = std::holds_alternative<std::vector<std::int32_t>>(attribute.values);
+  const std::string the_attribute = "the attribute '" + attribute.name + "'";
+  if (attribute.components < 1 || attribute.components > (whole ? 1 : 4))
+    throw Error(the_attribute + " cannot have " + std::to_string(attribute.components) + " components");
+  if (size != elements * std::size_t(attribute.components))
+    throw Error(the_attribute + " has " + std::to_string(size) + " values, but the mesh needs " +
+                std::to_string(elements * std::size_t(attribute.components)));
+  if (const auto* numbers = std::get_if<std::vector<float>>(&attribute.values))
+    if (!std::ranges::all_of(*numbers, [](float value) { return std::isfinite(value); }))
+      throw Error(the_attribute + " has a value that is not finite");
+}
+
+/// Returns the closest points of a leaf's voxels on their nearest triangles.
+Feet find_feet(const PolygonMesh& mesh, const openvdb::Int32Tree::LeafNodeType& leaf, double voxel_size) {
+  const IndexSoup soup(mesh, 1.0);
+  Feet feet;
+  feet.found.reserve(leaf.onVoxelCount());
+  for (auto voxel = leaf.cbeginValueOn(); voxel; ++voxel) {
+    if (*voxel < 0) {
+      feet.missing.push_back(voxel.pos());
+      continue;
+    }
+    const openvdb::Coord at = voxel.getCoord();
+    const auto& [a, b, c] = Facet(soup.corners(std::size_t(*voxel))).corner;
+    feet.found.push_back({voxel.pos(), std::uint32_t(*voxel),
+                          closest_point(voxel_size * Eigen::Vector3d(at.x(), at.y(), at.z()), a, b, c)});
+  }
+  return feet;
+}
+
+/// Makes the grid of closest points, if requested, and those of the attributes, over the voxels of `nearest`
+/// and with its transform. @throws Error for an invalid attribute; Cancelled.
+std::vector<openvdb::GridBase::Ptr> transfer_from_surface(const PolygonMesh& mesh,
+                                                          const openvdb::Int32Grid& nearest,
+                                                          double voxel_size, bool closest_points,
+                                                          const std::vector<const MeshAttribute*>& attributes,
+                                                          RunContext& context) {
+  const Stage stage(context, "values from the surface");
+  std::vector<Layer> layers;
+  if (closest_points) {
+    layers.push_back(make_layer<openvdb::Vec3SGrid>(
+        "closest-point", nearest, openvdb::Vec3s(0.0f),
+        [](const Foot& foot) { return openvdb::Vec3s(to_vec3d(foot.point.position)); }));
+    // Points, which a program that moves the grid has to move along: an absolute vector in world space.
+    layers[0].grid->setVectorType(openvdb::VEC_CONTRAVARIANT_ABSOLUTE);
+    layers[0].grid->setIsInWorldSpace(true);
+  }
+  for (const MeshAttribute* attribute : attributes) {
+    context.check();
+    check_attribute(mesh, *attribute);
+    add_layers(mesh, *attribute, nearest, layers);
+  }
+  std::vector<const openvdb::Int32Tree::LeafNodeType*> leaves;
+  nearest.tree().getNodes(leaves);
+  parallel_blocks(leaves.size(), context, [&](std::size_t i) {
+    const Feet feet = find_feet(mesh, *leaves[i], voxel_size);
+    for (const Layer& layer : layers) layer.fill(i, feet);
+  });
+  std::vector<openvdb::GridBase::Ptr> grids;
+  for (const Layer& layer : layers) {
+    layer.prune();
+    grids.push_back(layer.grid);
+  }
+  if (closest_points)
+    grids.front()->insertMeta(kZeroOfPositions, openvdb::Vec3DMetadata(to_vec3d(mesh.origin)));
+  return grids;
+}
+
+// ---- Requests.
+
+/// Returns the requested attributes, in the order of the mesh, each once. @throws Error if one does not
+/// exist.
 std::vector<const MeshAttribute*> chosen_attributes(const PolygonMesh& mesh, const VolumeRequest& request) {
   std::vector<const MeshAttribute*> chosen;
   std::string names;
@@ -130,8 +349,7 @@ std::vector<const MeshAttribute*> chosen_attributes(const PolygonMesh& mesh, con
   return chosen;
 }
 
-/// Refuses what is made of an inside if there is none. It is asked twice: before the work, and once it is
-/// known.
+/// Throws Error for grids that need an inside if there is none. Called before the work and after it.
 void check_signs(const VolumeRequest& request, bool is_signed) {
   if (is_signed) return;
   for (const auto& [asked, name] : {std::pair(request.fog, "fog"), std::pair(request.hermite, "hermite")})
@@ -140,20 +358,21 @@ void check_signs(const VolumeRequest& request, bool is_signed) {
                   " needs an inside, but the distances have no sign; leave it out");
 }
 
-/// Bytes beyond those that the distances alone take: leaves of 512 values for each grid, and for the
+/// Returns the bytes in addition to those of the distances: leaves of 512 values for each grid, and for the
 /// triangles that some are made from.
 double bytes_of_outputs(const VolumeRequest& request, const std::vector<const MeshAttribute*>& attributes,
                         double leaves) {
   std::size_t bytes = (request.udf ? 4 : 0) + (request.fog ? 4 : 0) +
                       (request.hermite ? sizeof(FloatVoxel) : 0) +
                       (request.closest_point ? sizeof(openvdb::Vec3s) : 0);
-  for (const MeshAttribute* attribute : attributes) bytes += bytes_per_voxel(*attribute);
+  // Two components become a vector of three.
+  for (const MeshAttribute* attribute : attributes)
+    bytes += 4 * std::size_t(attribute->components == 2 ? 3 : attribute->components);
   if (request.triangle_id || request.closest_point || !attributes.empty()) bytes += 4;
   return 512.0 * leaves * double(bytes);
 }
 
-/// Refuses grids that together need more memory than there is, before the work begins. Unknown memory is
-/// enough.
+/// Throws Error for grids that together need more memory than is available. Unknown memory is enough.
 void check_fits(const PolygonMesh& mesh, const VoxelizeOptions& options, const VolumeRequest& request,
                 const std::vector<const MeshAttribute*>& attributes) {
   check_voxelization_fits(mesh, options.voxel_size, options.exterior_band, options.interior_band);
@@ -182,29 +401,27 @@ VolumeRequest parse_volume_request(const std::string& list) {
   VolumeRequest request;
   std::istringstream names(list);
   const std::string attribute = "attribute:";
+  const std::pair<const char*, bool VolumeRequest::*> grids[] = {
+      {"sdf", &VolumeRequest::sdf},
+      {"udf", &VolumeRequest::udf},
+      {"triangle-id", &VolumeRequest::triangle_id},
+      {"closest-point", &VolumeRequest::closest_point},
+      {"fog", &VolumeRequest::fog},
+      {"hermite", &VolumeRequest::hermite},
+      {"attributes", &VolumeRequest::all_attributes}};
   for (std::string name; std::getline(names, name, ',');) {
-    if (name == "sdf")
-      request.sdf = true;
-    else if (name == "udf")
-      request.udf = true;
-    else if (name == "triangle-id")
-      request.triangle_id = true;
-    else if (name == "closest-point")
-      request.closest_point = true;
-    else if (name == "fog")
-      request.fog = true;
-    else if (name == "hermite")
-      request.hermite = request.sdf = true;
-    else if (name == "attributes")
-      request.all_attributes = true;
+    const auto grid = std::ranges::find_if(grids, [&](const auto& known) { return name == known.first; });
+    if (grid != std::end(grids))
+      request.*grid->second = true;
     else if (name.starts_with(attribute))
       request.attributes.push_back(name.substr(attribute.size()));
     else
-      throw Error("there is no grid '" + name + "'; choose of " + kNames);
+      throw Error("unknown grid '" + name + "'; choose from " + kNames);
   }
-  // getline() takes a comma at the end for the end of the list, and says nothing of the name that is missing.
+  request.sdf |= request.hermite;
+  // getline() ignores a comma at the end.
   if (list.empty() || list.back() == ',')
-    throw Error("a name is missing in the list of grids; choose of " + std::string(kNames));
+    throw Error("a name is missing in the list of grids; choose from " + std::string(kNames));
   return request;
 }
 
@@ -219,10 +436,9 @@ VolumeOutputs make_volume_outputs(const PolygonMesh& mesh, const VoxelizeOptions
                                   const VolumeRequest& request, const VoxelizeBy& by, RunContext& context) {
   const std::vector<const MeshAttribute*> attributes = chosen_attributes(mesh, request);
   check_signs(request, options.signs != SignRule::none);
-  // For the distances alone voxelize() does the same.
+  // For the distances only, voxelize() does the same.
   if (!request.only_sdf()) check_fits(mesh, options, request, attributes);
 
-  // The triangles cost a number a voxel, so they are kept only where something is made from them.
   VoxelizeOptions with_nearest = options;
   with_nearest.nearest = request.triangle_id || request.closest_point || !attributes.empty();
   const Voxelization made = by(with_nearest);
@@ -230,22 +446,21 @@ VolumeOutputs make_volume_outputs(const PolygonMesh& mesh, const VoxelizeOptions
 
   VolumeOutputs outputs;
   outputs.active_voxels = made.distance->activeVoxelCount();
-  // Without signs the distances themselves are "udf", and there is no other grid to make of them.
+  // Without signs the distances themselves are "udf".
   if (request.sdf || (request.udf && !made.is_signed)) outputs.grids.push_back(made.distance);
   if (request.udf && made.is_signed) outputs.grids.push_back(make_udf(*made.distance, context));
   if (request.triangle_id)
     outputs.grids.push_back(make_triangle_id(made.nearest, request.triangle_numbers, context));
   if (request.closest_point || !attributes.empty())
     for (const auto& grid : transfer_from_surface(mesh, *made.nearest, options.voxel_size,
-                                                  {request.closest_point, attributes}, context))
+                                                  request.closest_point, attributes, context))
       outputs.grids.push_back(grid);
   if (request.fog) outputs.grids.push_back(make_fog(*made.distance, options, request.fog_exterior, context));
-  if (request.hermite) outputs.hermite = make_hermite(made.distance, mesh, context);
+  if (request.hermite) outputs.hermite = sample_polygons(make_level_set(made.distance), 0.0, mesh, context);
   return outputs;
 }
 
 std::filesystem::path hermite_path(const std::filesystem::path& path) {
-  // The extension stays last, so that the file is still known for a .vdb.
   std::filesystem::path beside = path;
   return beside.replace_extension(".hermite" + path.extension().string());
 }

@@ -27,7 +27,7 @@ else:
 low, high = scan.value_range
 print(f"scan: {' x '.join(map(str, scan.dims))} samples, {low:.0f} to {high:.0f} HU")
 
-# Inside is what is greater than the isovalue; where the bone runs out of the scan it gets a flat cap.
+# Samples above the isovalue are inside; where the bone reaches the end of the scan it gets a flat cap.
 log = hermesh.Log()
 bone = hermesh.extract(scan, isovalue=300, extractor="manifold-dual-contouring", tolerance=0.1, written_in_single=True, log=log)
 report = hermesh.validate(bone)

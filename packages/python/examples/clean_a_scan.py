@@ -22,7 +22,7 @@ else:
 before = hermesh.validate(scan)
 print(f"scan:  {before.triangles} triangles, {before.boundary_edges} open edges, {before.inconsistent_edges} turned-over edges")
 
-# Winding numbers find the inside of what has holes; the mesh stays within 0.2 voxels of the uniform one.
+# Winding numbers find the inside of meshes with holes; the mesh stays within 0.2 voxels of the uniform one.
 log = hermesh.Log()
 clean = hermesh.remesh(scan, resolution=120, signs="winding-number", tolerance=0.2, log=log)
 after = hermesh.validate(clean, reference=scan)

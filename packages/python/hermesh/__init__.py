@@ -4,18 +4,18 @@
     mesh = hermesh.remesh("scan.ply", resolution=400, tolerance=0.05)
     mesh.points, mesh.triangles, mesh.quads        # numpy arrays, not copies
 
-Options have the names, defaults and ranges of the program `hermesh`, with `_` for `-`, and results are the bytes that it writes
-for the same options, at any number of threads. What is not an option of the function is one of the method (`-o` of the
-program), such as `tolerance` above; `extractors()` and `voxelizers()` list them.
+Options have the names, defaults and ranges of the program `hermesh`, with `_` for `-`, and results have the bytes that it
+writes for the same options, at any number of threads. Other keywords are options of the method (`-o` of the program), such as
+`tolerance` above; `extractors()` and `voxelizers()` list them.
 
-Where a function takes a mesh it takes a `Mesh`; the path of a file; what has `.vertices` and `.faces` (trimesh) or `.points` and
-`.cells_dict` (meshio); or a tuple (points, polygons) or (points, triangles, quads) of arrays.
+A mesh parameter accepts a `Mesh`, the path of a file, an object with `.vertices` and `.faces` (trimesh) or with `.points` and
+`.cells_dict` (meshio), or a tuple (points, polygons) or (points, triangles, quads) of arrays.
 
-Each function that works takes
-    progress  a callable of the name of a stage and the share of it that is done, 0 to 1; what it raises ends the work
-    cancel    something with is_set(), such as a threading.Event: the work ends with `Cancelled` when it is set
-    threads   how many at most (default: all of the machine)
-    log       a `Log`, which gets notes, times and figures; without one the notes are warnings of the category `Note`
+Each function takes
+    progress  a callable of the name of a stage and its completed share, 0 to 1; an exception that it raises ends the work
+    cancel    an object with is_set(), such as a threading.Event: the work ends with `Cancelled` when it is set
+    threads   maximum number of threads (default: all of the machine)
+    log       a `Log`, which receives notes, times and figures; without one the notes are warnings of the category `Note`
 Ctrl-C ends the work. Other Python threads run meanwhile.
 """
 
@@ -56,14 +56,14 @@ OptionValue = Union[str, int, float, bool]
 
 
 class Note(UserWarning):
-    """A sentence that the user should read although the work went on, such as how much of a surface is thinner than a voxel."""
+    """A warning, such as the share of a surface that is thinner than a voxel."""
 
 
 class Log:
-    """What calls have to say beside their results; each call that is given the log adds to it.
+    """Notes and statistics; each call with the log adds to it.
 
-    notes: sentences that the user should read. stage_seconds: (stage, seconds) in the order of their ends. figures: name to
-    number, such as `lost_surface_share`.
+    notes: warnings. stage_seconds: (stage, seconds) in the order of their ends. figures: name to number, such as
+    `lost_surface_share`.
     """
 
     def __init__(self) -> None:
@@ -73,7 +73,7 @@ class Log:
 
 
 class _Watching:
-    """Gives a call its watch, and hands what it noted to whoever called, also where the call raises."""
+    """Provides the watch of a call, and passes its notes to the caller even if the call raises."""
 
     def __init__(self, progress: Progress | None, cancel: _IsSet | None, threads: int | None, log: Log | None) -> None:
         if log is not None and not isinstance(log, Log):
@@ -99,9 +99,9 @@ class _Watching:
 
 
 def as_mesh(mesh: MeshLike, *, attributes: bool = False) -> Mesh:
-    """What functions make of the meshes that they are given; see the module. A `Mesh` is returned as it is.
+    """Converts a mesh parameter to a `Mesh`; see the module.
 
-    With `attributes` those that files, trimesh and meshio objects have are taken, too. Raises Error for what is no mesh of
+    With `attributes` those of files, trimesh and meshio objects are converted, too. Raises Error for an invalid mesh of
     triangles and quads, and TypeError for another kind of object.
     """
     if isinstance(mesh, Mesh):
@@ -130,7 +130,7 @@ def _of_polygons(points: Any, polygons: Any, **attributes: Any) -> Mesh:
 
 
 def _usable(arrays: Mapping[str, Any]) -> dict[str, Any]:
-    """Those arrays that can be attributes: numbers, one to four for each element."""
+    """Returns the arrays that can be attributes: numbers, one to four for each element."""
     usable = {}
     for name, array in arrays.items():
         array = np.asarray(array)
@@ -151,7 +151,7 @@ def _of_meshio(mesh: Any, attributes: bool) -> Mesh:
 
 
 def to_trimesh(mesh: Mesh) -> Any:
-    """A trimesh.Trimesh of the mesh in world units, its quads cut as they are meant. Needs the package trimesh."""
+    """A trimesh.Trimesh of the mesh in world units, its quads split as they are meant. Needs the package trimesh."""
     import trimesh
     return trimesh.Trimesh(mesh.world_points(), mesh.triangulated(), process=False)
 
@@ -165,10 +165,10 @@ def to_meshio(mesh: Mesh) -> Any:
 
 def read_mesh(path: str | os.PathLike[str], *, attributes: bool = False, progress: Progress | None = None,
               cancel: _IsSet | None = None, threads: int | None = None, log: Log | None = None) -> Mesh:
-    """Reads PLY, OBJ, OFF, STL, glTF 2.0 or 3MF, each also gzipped; polygons of more corners are cut into triangles.
+    """Reads PLY, OBJ, OFF, STL, glTF 2.0 or 3MF, each also gzipped; polygons of more corners are split into triangles.
 
     With `attributes` those of PLY and OBJ are read, too. Raises Error for a file that is missing, damaged, of another type or
-    without polygons. What was forgiven is a note.
+    without polygons. Adds a note for each tolerated fault.
     """
     with _Watching(progress, cancel, threads, log) as watch:
         return _core.read_mesh(os.fspath(path), attributes, watch)
@@ -176,10 +176,9 @@ def read_mesh(path: str | os.PathLike[str], *, attributes: bool = False, progres
 
 def write_mesh(path: str | os.PathLike[str], mesh: MeshLike, *, progress: Progress | None = None,
                cancel: _IsSet | None = None, threads: int | None = None, log: Log | None = None) -> None:
-    """Writes PLY (binary, with attributes), OBJ, OFF, STL, glTF (.glb, .gltf) or 3MF, as the name ends; never half a file.
+    """Writes PLY (binary, with attributes), OBJ, OFF, STL, glTF (.glb, .gltf) or 3MF, by the ending of the name, in an atomic way.
 
-    Raises Error for an unknown end of the name or a path that cannot be written. STL has single precision; a note says what
-    that cost.
+    Raises Error for an unknown ending or a path that cannot be written. STL has single precision; a note gives the loss.
     """
     mesh = as_mesh(mesh, attributes=True)
     with _Watching(progress, cancel, threads, log) as watch:
@@ -191,9 +190,9 @@ def write_mesh(path: str | os.PathLike[str], mesh: MeshLike, *, progress: Progre
 
 def read_vdb(path: str | os.PathLike[str], *, grid: str = "", progress: Progress | None = None, cancel: _IsSet | None = None,
              threads: int | None = None, log: Log | None = None) -> Volume:
-    """Reads a scalar grid of a .vdb file: that of the name `grid`, else `sdf`, else the only one there is.
+    """Reads a scalar grid of a .vdb file: the named one, else `sdf`, else the only one.
 
-    Raises Error for a file that is missing or damaged, and a grid that is not there or not scalar.
+    Raises Error for a file that is missing or damaged, and a grid that is missing or not scalar.
     """
     with _Watching(progress, cancel, threads, log) as watch:
         return _core.read_vdb(os.fspath(path), grid, watch)
@@ -211,8 +210,7 @@ def write_vdb(path: str | os.PathLike[str], volumes: Volume | Iterable[Volume], 
 
 
 def to_pyopenvdb(volume: Volume) -> Any:
-    """The volume as a grid of the module pyopenvdb (Debian: python3-openvdb), by way of a file: every value, tile and metadatum
-    stays as it is."""
+    """Converts the volume to a grid of the module pyopenvdb (Debian: python3-openvdb) through a file, without changes."""
     import pyopenvdb
     with tempfile.TemporaryDirectory() as folder:
         path = os.path.join(folder, "volume.vdb")
@@ -222,7 +220,7 @@ def to_pyopenvdb(volume: Volume) -> Any:
 
 
 def from_pyopenvdb(grid: Any) -> Volume:
-    """A volume of a scalar grid of the module pyopenvdb, by way of a file. The grid stays as it is."""
+    """Converts a scalar grid of the module pyopenvdb to a volume through a file."""
     import pyopenvdb
     with tempfile.TemporaryDirectory() as folder:
         path = os.path.join(folder, "volume.vdb")
@@ -236,14 +234,14 @@ def import_volume(path: str | os.PathLike[str], *, frame: int | None = None, dim
                   log: Log | None = None) -> Volume:
     """Imports a CT or MRI (NIfTI-1: .nii, .hdr, .img), or with `dims` raw samples; all also gzipped.
 
-    frame: which of a NIfTI file's volumes, from 0.
-    dims, type, spacing, offset: raw samples: their numbers along x (fastest in the file), y and z; uint8, int8, uint16, int16,
-        uint32, int32, uint64, int64, float32 or float64, with le (the default) or be behind; their distances in mm; bytes before
-        the first.
-    replace_nan: the value in place of samples that are not finite, which are refused otherwise.
+    frame: index of the volume in a NIfTI file, from 0.
+    dims, type, spacing, offset: of raw samples: their numbers along x (fastest in the file), y and z; uint8, int8, uint16, int16,
+        uint32, int32, uint64, int64, float32 or float64, followed by le (default) or be; their distances in mm; bytes before the
+        first.
+    replace_nan: the value that replaces samples that are not finite, which are refused otherwise.
 
-    Returns the volume `volume`, in millimetres, every sample of which is active. Raises Error for a file that is missing, damaged
-    or of another kind or size than was said.
+    Returns the volume `volume`, in millimetres, with all samples active. Raises Error for a file that is missing, damaged or of
+    another kind or size than specified.
     """
     with _Watching(progress, cancel, threads, log) as watch:
         return _core.import_volume(os.fspath(path), frame, None if dims is None else list(dims), type,
@@ -254,7 +252,7 @@ def import_volume(path: str | os.PathLike[str], *, frame: int | None = None, dim
 
 
 def _text(value: OptionValue) -> str:
-    """The value of a method's option as the command line has it."""
+    """Returns the text of a method's option on the command line."""
     if isinstance(value, str):
         return value
     if isinstance(value, (bool, np.bool_)):
@@ -270,44 +268,26 @@ def _texts(options: Mapping[str, OptionValue] | None) -> dict[str, str]:
     return {name: _text(value) for name, value in (options or {}).items()}
 
 
-def _voxelizing(*, resolution: int | None = None, voxel_size: float | None = None, like: Volume | None = None,
-                exterior_band: float = 3.0, interior_band: float = 3.0, voxelizer: str = "hermesh", signs: str | None = None,
-                voxelizer_options: Mapping[str, OptionValue] | None = None) -> _core.VoxelizeOptions:
-    options = _core.VoxelizeOptions()
-    options.resolution = resolution
-    options.voxel_size = voxel_size
-    if like is not None:
-        options.like = like
-    options.exterior_band = exterior_band
-    options.interior_band = interior_band
-    options.voxelizer = voxelizer
+def _filled(options: Any, /, **values: Any) -> Any:
+    """Returns the options with these members; None keeps a default."""
+    for name, value in values.items():
+        if value is not None:
+            setattr(options, name, value)
+    return options
+
+
+def _voxelizing(*, voxelizer: str, signs: str | None, voxelizer_options: Mapping[str, OptionValue] | None,
+                **values: Any) -> _core.VoxelizeOptions:
     texts = _texts(voxelizer_options)
     if signs is not None:
         if "signs" in texts:
             raise Error(f"option 'signs' of {voxelizer} is given twice")
         texts["signs"] = signs
-    options.options = texts
-    return options
+    return _filled(_core.VoxelizeOptions(), voxelizer=voxelizer, options=texts, **values)
 
 
-def _extracting(of_method: Mapping[str, OptionValue], *, extractor: str = "", isovalue: float = 0.0, ends: str = "closed",
-                mask: Volume | None = None, frustum: Frustum | None = None, frustum_resolution: int = 84,
-                outside: str = "simplify", tolerance_grid: Volume | None = None,
-                written_in_single: bool = False) -> _core.ExtractOptions:
-    options = _core.ExtractOptions()
-    options.extractor = extractor
-    options.options = _texts(of_method)
-    options.isovalue = isovalue
-    options.ends = ends
-    if mask is not None:
-        options.mask = mask
-    options.frustum = frustum
-    options.frustum_resolution = frustum_resolution
-    options.outside = outside
-    if tolerance_grid is not None:
-        options.tolerance_grid = tolerance_grid
-    options.written_in_single = written_in_single
-    return options
+def _extracting(of_method: Mapping[str, OptionValue], /, **values: Any) -> _core.ExtractOptions:
+    return _filled(_core.ExtractOptions(), options=_texts(of_method), **values)
 
 
 # ---- The functions.
@@ -321,12 +301,12 @@ def voxelize(mesh: MeshLike, *, resolution: int | None = None, voxel_size: float
 
     resolution: voxels along the longest side of the mesh; or
     voxel_size: edge of a voxel, world units; or
-    like: a volume whose lattice the new one shares.
-    exterior_band, interior_band: voxels outside and inside that have their distance, at least 1.
+    like: a volume; the new one shares its lattice.
+    exterior_band, interior_band: widths of the bands outside and inside, in voxels, at least 1.
     voxelizer, signs, and options of the voxelizer: see voxelizers().
 
-    Raises Error for a mesh without polygons or extent, a size that does not fit in memory, and options that there are not. What of
-    the surface passes between the samples is a note.
+    Raises Error for a mesh without polygons or extent, a size that does not fit in memory, and unknown options. Adds a note if
+    surface is lost between the samples.
     """
     options = _voxelizing(resolution=resolution, voxel_size=voxel_size, like=like, exterior_band=exterior_band,
                           interior_band=interior_band, voxelizer=voxelizer, signs=signs, voxelizer_options=voxelizer_options)
@@ -343,7 +323,7 @@ def voxelize_grids(mesh: MeshLike, grids: str | Iterable[str], *, fog_exterior: 
     """Several volumes of one voxelization, in the order of the program's file: sdf, udf, fog, closest-point, triangle-id,
     attributes, attribute:NAME, with commas between them or as a list.
 
-    fog_exterior: whether the fog's ramp lies over both bands, not the interior one alone. The others as in voxelize().
+    fog_exterior: True if the fog's ramp covers both bands, not only the interior one. The others as in voxelize().
     """
     options = _voxelizing(resolution=resolution, voxel_size=voxel_size, like=like, exterior_band=exterior_band,
                           interior_band=interior_band, voxelizer=voxelizer, signs=signs, voxelizer_options=voxelizer_options)
@@ -362,16 +342,16 @@ def extract(volume: Volume, *, extractor: str = "dual-contouring", isovalue: flo
 
     extractor, and options of it: see extractors().
     isovalue: value of the surface, in the units of the volume.
-    source: the polygons that the volume was made from, for extractors that take exact crossings.
-    ends: where the surface runs into the end of the data: "closed" with a flat cap, or "open".
-    mask: where an adaptive extractor keeps its bound: in a level set where it is negative, in any other volume where it differs
-        from the background; or
-    frustum: what a camera sees, with frustum_resolution voxels along its longest side.
+    source: the polygons that the volume was made from, for extractors that use exact crossings.
+    ends: where the surface reaches the end of the data: "closed" with a flat cap, or "open".
+    mask: where an adaptive extractor keeps its bound: where a level set is negative, where any other volume differs from its
+        background; or
+    frustum: the view of a camera, with frustum_resolution voxels along its longest side.
     outside: outside the mask: "simplify", "nothing" (no polygons) or "everywhere" (the bound).
     tolerance_grid: a volume whose values, none negative, scale the bound.
-    written_in_single: True where the mesh goes into an STL file: what is proved of it is then proved of it as written.
+    written_in_single: True if the mesh goes into an STL file: guarantees then hold for the written mesh.
 
-    Raises Error where there is no surface, for options that there are not, and for those that have no effect.
+    Raises Error if there is no surface, for unknown options, and for options without effect.
     """
     chosen = _extracting(options, extractor=extractor, isovalue=isovalue, ends=ends, mask=mask, frustum=frustum,
                          frustum_resolution=frustum_resolution, outside=outside, tolerance_grid=tolerance_grid,
@@ -405,11 +385,11 @@ def remesh(mesh: MeshLike, *, resolution: int | None = None, voxel_size: float |
 
 
 class BoundedRemesh(NamedTuple):
-    """A mesh with the distances that are proved of it, world units."""
+    """A mesh with its certified distances, world units."""
     mesh: Mesh
-    error: float  # that was asked for or, for a budget, found
-    to_polygons: float  # no place of the mesh is farther from the boundary of the polygons' solid
-    from_polygons: float  # no place of that is farther from the mesh
+    error: float  # the requested one or, for a budget, the one found
+    to_polygons: float  # bound of the distance from the mesh to the boundary of the polygons' solid
+    from_polygons: float  # bound of the distance from that boundary to the mesh
     voxel_size: float
 
 
@@ -417,11 +397,11 @@ def remesh_within(mesh: MeshLike, *, error: float | None = None, triangles: int 
                   over_holes: bool = False, smallest_voxel: float = 0.0, limit_points: float = 3e7,
                   written_in_single: bool = False, progress: Progress | None = None, cancel: _IsSet | None = None,
                   threads: int | None = None, log: Log | None = None) -> BoundedRemesh:
-    """A mesh within `error` (world units) of the boundary of the polygons' solid, both ways, which is proved; or with so many
-    `triangles` at most, at the smallest error that was found for them. Closed, manifold and free of self-intersection.
+    """Returns a mesh with a certified two-sided distance of at most `error` (world units) to the boundary of the polygons' solid,
+    or with at most `triangles` and the smallest certified error found. Closed, manifold and free of self-intersection.
 
-    over_holes lets it close holes, where no polygon is near. smallest_voxel (world units, 0 for an eighth of the error) and
-    limit_points say when to give up; then hermesh.Error says where and why.
+    over_holes allows it to close holes where no polygon is near. smallest_voxel (world units, 0 for an eighth of the error) and
+    limit_points limit the work; beyond them the function raises hermesh.Error with location and reason.
     """
     mesh = as_mesh(mesh)
     with _Watching(progress, cancel, threads, log) as watch:
@@ -435,11 +415,11 @@ def combine(operation: str, a: MeshLike, b: MeshLike, *, resolution: int | None 
             written_in_single: bool = False, progress: Progress | None = None, cancel: _IsSet | None = None,
             threads: int | None = None, log: Log | None = None, **options: OptionValue) -> Mesh:
     """The "union", "intersection" or "difference" (a without b) of two meshes' solids, both on one lattice with their exact
-    crossings, which keep the curves where their surfaces meet.
+    crossings, which preserve the curves where their surfaces intersect.
 
     resolution: voxels along the longest side of the larger solid; or voxel_size, world units. The others as in remesh().
 
-    Raises Error for a result that is empty or everywhere thinner than a voxel. What is lost between samples is a note.
+    Raises Error for a result that is empty or everywhere thinner than a voxel. Adds a note if parts are lost between samples.
     """
     voxelizing = _voxelizing(resolution=resolution, voxel_size=voxel_size, exterior_band=exterior_band,
                              interior_band=interior_band, voxelizer=voxelizer, signs=signs, voxelizer_options=voxelizer_options)
@@ -461,44 +441,34 @@ def fracture(solid: MeshLike | Volume, cutters: str | MeshLike | Sequence[MeshLi
 
     cutters: "voronoi:N", "chunks:N" (Voronoi cells with rough walls), "planes:N", "planes:NX,NY,NZ,D;..." (N.x = D, world units),
         "mesh:FILE,..." or "mesh:FILE*N"; or a list of meshes, which cut one after another.
-    copies: of each mesh of the list, scattered and turned at random; 0: each where it is.
-    seed: of everything random.
-    roughness: how far the walls of chunks are displaced, as a part of the distance of seeds, 0 to 1.
-    impact: scatter densest about this point; impact_radius: where the density has halved; world units.
+    copies: number of copies of each mesh of the list, scattered and rotated at random; 0: each once, in place.
+    seed: random seed.
+    roughness: displacement of the walls of chunks relative to the distance of seeds, 0 to 1.
+    impact: scatter densest about this point; impact_radius: distance at which the density has halved; world units.
     density: scatter in proportion to the values of this volume.
-    mesh_scale: of scattered meshes.
+    mesh_scale: scale factor of scattered meshes.
     method: "labelled", or "thesis" as printed, with its rule "printed" or "repaired".
-    tolerance: voxels that pieces may be from their finest meshes; 0: nothing is merged.
-    min_volume: voxels: smaller pieces join a neighbour; 0 keeps all. split: whether a piece that falls apart becomes several.
+    tolerance: maximum distance from the finest meshes, voxels; 0: nothing is merged.
+    min_volume: voxels: smaller pieces join a neighbour; 0 keeps all. split: True to split disconnected pieces.
     hermite: data of the solid: "auto", "exact" from polygons, or "level-set".
-    resolution or voxel_size, bands, voxelizer: as in remesh(); not for a level set, which has voxels already.
+    resolution or voxel_size, bands, voxelizer: as in remesh(); not for a level set, which already has voxels.
 
-    Raises Error for options that there are not, or a solid without an inside. What cutters did not cut is a note.
+    Raises Error for unknown options, or a solid without an inside. Adds a note for each cutter without effect.
     """
-    options = _core.FractureOptions()
+    options = _filled(_core.FractureOptions(), seed=seed, roughness=roughness,
+                      impact=None if impact is None else [float(x) for x in impact], impact_radius=impact_radius,
+                      density=density, mesh_scale=mesh_scale, method=method, tolerance=tolerance, rule=rule,
+                      min_volume=min_volume, split=split, hermite=hermite)
     if isinstance(cutters, str):
         if copies:
-            raise Error("copies are of meshes that are given as such; say mesh:FILE*N for those of a file")
+            raise Error("copies are for meshes in a list; use mesh:FILE*N for a file")
         options.cutters = cutters
     else:
         several = cutters if isinstance(cutters, list) else [cutters]
         options.meshes = [_core.CutterMesh(f"cutter {i}", as_mesh(m), copies) for i, m in enumerate(several, 1)]
-    options.seed = seed
-    options.roughness = roughness
-    options.impact = None if impact is None else [float(x) for x in impact]
-    options.impact_radius = impact_radius
-    if density is not None:
-        options.density = density
-    options.mesh_scale = mesh_scale
-    options.method = method
-    options.tolerance = tolerance
-    options.rule = rule
-    options.min_volume = min_volume
-    options.split = split
-    options.hermite = hermite
     if isinstance(solid, Volume):
         if resolution is not None or voxel_size is not None:
-            raise Error("a level set has voxels already: leave out resolution and voxel_size")
+            raise Error("a level set already has voxels: leave out resolution and voxel_size")
         with _Watching(progress, cancel, threads, log) as watch:
             return _core.fracture_volume(solid, options, watch)
     voxelizing = _voxelizing(resolution=resolution, voxel_size=voxel_size, exterior_band=exterior_band,
@@ -508,11 +478,11 @@ def fracture(solid: MeshLike | Volume, cutters: str | MeshLike | Sequence[MeshLi
         return _core.fracture(mesh, voxelizing, options, watch)
 
 
-def _judges() -> Any:
+def _validators() -> Any:
     try:
         from . import _validation
     except ImportError as error:
-        raise Error(f"the judges are not installed with this package of hermesh: {error}") from error
+        raise Error(f"validation is not installed with this package of hermesh: {error}") from error
     return _validation
 
 
@@ -520,37 +490,37 @@ def validate(mesh: MeshLike, *, reference: MeshLike | None = None, certify: bool
              dihedral: float = 30.0, samples: int = 200_000, voxel_size: float = 0.0, self_intersections: bool = True,
              libraries: bool = True, progress: Progress | None = None, cancel: _IsSet | None = None, threads: int | None = None,
              log: Log | None = None) -> "_validation.Report":
-    """Judges a mesh: topology, self-intersections, distances.
+    """Validates a mesh: topology, self-intersections, distances.
 
-    reference: mesh to measure the distances to and from, and the solid to compare with.
-    certify: whether to bound the Hausdorff distances to the reference for certain.
-    features: mesh whose sharp edges, of at least `dihedral` degrees, and corners should be there.
+    reference: mesh for the distances and the comparison of the solids.
+    certify: True to certify bounds of the Hausdorff distances to the reference.
+    features: mesh whose sharp edges, of at least `dihedral` degrees, and corners the mesh should reproduce.
     samples: on each surface for the distances.
-    voxel_size: world units, of the volume that the mesh was made from: what lies within sqrt(3) of them is explained.
-    self_intersections: whether they are looked for. libraries: whether OpenMesh and CGAL count, too.
+    voxel_size: world units, of the volume that the mesh was made from: differences within sqrt(3) voxels are explained.
+    self_intersections: True to search for them. libraries: True to let OpenMesh and CGAL count, too.
 
-    Returns a report: str() of it is the verdict in words, `watertight` and the counts are attributes, to_dict() is all of it. The
-    judges link CGAL, so that what calls them is under GPL-3. Raises Error for options that have no effect without a reference.
+    Returns a report: str() of it is the verdict, `watertight` and the counts are attributes, to_dict() has all values. Validation
+    links CGAL, so programs that call it are under GPL-3. Raises Error for options without effect.
     """
-    judges = _judges()
-    judged = as_mesh(mesh)
+    validators = _validators()
+    validated = as_mesh(mesh)
     of_reference = None if reference is None else as_mesh(reference)
     of_features = None if features is None else as_mesh(features)
     with _Watching(progress, cancel, threads, log) as watch:
-        return judges.validate(judged, of_reference, of_features, self_intersections, libraries, certify, samples, dihedral,
+        return validators.validate(validated, of_reference, of_features, self_intersections, libraries, certify, samples, dihedral,
                                voxel_size, watch)
 
 
 def validate_fracture(pieces: Fracture | Iterable[MeshLike], *, progress: Progress | None = None, cancel: _IsSet | None = None,
                       threads: int | None = None, log: Log | None = None) -> "_validation.FractureReport":
-    """Judges all pieces of a fracture together: whether each is right by itself, and all fit without gap or overlap."""
-    judges = _judges()
+    """Validates all pieces of a fracture together: each piece, and that all fit without gap or overlap."""
+    validators = _validators()
     if isinstance(pieces, Fracture):
         meshes = [piece.mesh for piece in pieces.pieces]
     else:
         meshes = [as_mesh(piece) for piece in pieces]
     with _Watching(progress, cancel, threads, log) as watch:
-        return judges.validate_fracture(meshes, watch)
+        return validators.validate_fracture(meshes, watch)
 
 
 def _write_mesh(self: Mesh, path: str | os.PathLike[str], **watching: Any) -> None:

@@ -50,7 +50,7 @@ with tempfile.TemporaryDirectory() as folder:
     theirs, ours = os.path.join(folder, "program.ply"), os.path.join(folder, "module.ply")
     program = [os.environ["HERMESH_PROGRAM"], "remesh", mesh, theirs, "--resolution", str(resolution), "--json"]
     module = [sys.executable, "-c", MODULE, mesh, str(resolution), ours]
-    # What either costs before it does anything.
+    # The cost of either before any work.
     starts = {"program": [run([os.environ["HERMESH_PROGRAM"], "--version"]) for _ in range(3)],
               "module": [run([sys.executable, "-c", "import hermesh"]) for _ in range(3)]}
     rows = {"program": [], "module": []}

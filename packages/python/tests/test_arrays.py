@@ -51,7 +51,7 @@ class Arrays(unittest.TestCase):
             peak = tracemalloc.get_traced_memory()[1]
             tracemalloc.stop()
             self.assertEqual(len(views[1]), 160_000)
-            # numpy tells tracemalloc of every array that it allocates; one of the triangles alone has 1.9 MB.
+            # numpy reports every allocated array to tracemalloc; one of the triangles alone has 1.9 MB.
             self.assertLess(peak, 100_000)
 
     def test_of_a_million_triangles_are_copied_once(self):
@@ -62,7 +62,7 @@ class Arrays(unittest.TestCase):
         views = [(mesh.points, mesh.triangles) for _ in range(100)]
         self.assertLess(time.process_time() - begun, 2.0)
         self.assertEqual(views[99][1].shape, (1_000_000, 3))
-        # 17 MiB a copy; what the allocator takes beyond is small beside that.
+        # 17 MiB a copy; the overhead of the allocator is small compared with that.
         self.assertLess(most_memory() - before, 1.3 * size)
 
     def test_of_every_type_of_number_make_the_same_mesh(self):

@@ -40,7 +40,7 @@ class SameBytes(unittest.TestCase):
 
     def test_of_remesh(self):
         self.compare(hermesh.remesh(self.torus, resolution=50), ".ply", "remesh", self.torus, "--resolution", 50)
-        # Arrays at hand are what the file of them is.
+        # Arrays give the same result as their file.
         self.compare(hermesh.remesh(torus(), voxel_size=0.05, tolerance=0.3, signs="winding-number", exterior_band=4), ".obj",
                      "remesh", self.torus, "--voxel-size", 0.05, "-o", "tolerance=0.3", "--signs", "winding-number",
                      "--exterior-band", 4)
@@ -102,7 +102,7 @@ class SameBytes(unittest.TestCase):
         theirs = json.loads(self.program("validate", mesh, "--reference", self.torus, "--json", "--certify", "--samples", 5000))
         report = hermesh.validate(mesh, reference=self.torus, certify=True, samples=5000)
         ours = report.to_dict()
-        # The program adds what it alone knows, such as the file's name.
+        # The program adds values such as the file's name.
         self.assertGreater(len(ours), 15)
         self.assertEqual({key: theirs.get(key) for key in ours}, ours)
         self.assertTrue(report.watertight)

@@ -21,7 +21,7 @@ class Volumes(unittest.TestCase):
         self.assertEqual(volume.value_range, (0, 234))
         np.testing.assert_array_equal(volume.to_numpy(), values)
         np.testing.assert_array_equal(volume.to_numpy((0, 3, 11), (2, 2, 2)), values[1:3, 1:3, 1:3])
-        # A linear function is what trilinear interpolation gives exactly; index (0.5, 3.25, 11) lies there.
+        # Trilinear interpolation is exact for a linear function; index (0.5, 3.25, 11) lies there.
         np.testing.assert_allclose(volume.sample([[1.25, 3.625, 8.5]]), [150 + 12.5 + 1])
         np.testing.assert_array_equal(volume.placement, [[0.5, 0, 0, 1], [0, 0.5, 0, 2], [0, 0, 0.5, 3], [0, 0, 0, 1]])
         turned = hermesh.Volume.from_numpy(values, placement=[[0, -2, 0, 5], [3, 0, 0, 6], [0, 0, -1, 7]])

@@ -16,7 +16,7 @@ inline Ints lane_numbers() {
   return result;
 }
 
-/// Lanes whose places are in one of the own boxes.
+/// Returns the lanes with positions in one of the own boxes.
 inline Ints own_lanes(const Scan& scan, Floats x, Floats y, Floats z) {
   Ints own{};
   for (int i = 0; i < scan.own_count; ++i) {
@@ -27,7 +27,7 @@ inline Ints own_lanes(const Scan& scan, Floats x, Floats y, Floats z) {
   return own;
 }
 
-/// Tells for points that follow one another what is certain of them, for as many prisms as `prisms` says.
+/// Determines the certain relations of consecutive vertices to the prisms.
 template <int prisms>
 inline void tell_points(const Scan& scan, const float* corner, std::uint32_t first, int count, Found& found) {
   const Surface& surface = *scan.surface;
@@ -35,8 +35,8 @@ inline void tell_points(const Scan& scan, const float* corner, std::uint32_t fir
     const std::uint32_t at = first + static_cast<std::uint32_t>(done);
     const Floats x = load(surface.x + at) + corner[0], y = load(surface.y + at) + corner[1],
                  z = load(surface.z + at) + corner[2];
-    // What is certain of a point holds with room for the rounding of single precision; between the two a
-    // point is told nothing about, and the caller looks at its triangles in double.
+    // Certain relations leave room for the rounding of single precision; the caller tests triangles of
+    // vertices without one in double.
     Ints inside[prisms], beyond_it[prisms];
     Ints certain{};
 #pragma GCC unroll 2
@@ -63,7 +63,7 @@ inline void tell_points(const Scan& scan, const float* corner, std::uint32_t fir
       inside[prism] = within & between;
       beyond_it[prism] = within & (up | down);
     }
-    // Which points are own is asked where it tells something new: soon it does not.
+    // The own boxes matter only until a result is known for each prism.
     Ints news{};
     for (int prism = 0; prism < prisms; ++prism) {
       if (!(found.inside >> prism & 1)) news |= inside[prism];
@@ -76,17 +76,17 @@ inline void tell_points(const Scan& scan, const float* corner, std::uint32_t fir
         found.beyond |= unsigned{any(beyond_it[prism] & own)} << prism;
       }
     }
-    // What is written beyond the run is right, or will be: the windows ascend.
+    // Values written beyond the run are right or overwritten later, because the windows ascend.
     const Shorts narrow = __builtin_convertvector(certain, Shorts);
     __builtin_memcpy(surface.certain + at, &narrow, sizeof narrow);
   }
 }
 
-/// The bits below the first bit of a word that has one, and those up to its last bit.
+/// Returns the bits below the first bit of a nonzero word, and those up to its last bit.
 inline std::uint64_t before_first(std::uint64_t word) { return (word & -word) - 1; }
 inline std::uint64_t until_last(std::uint64_t word) { return ~std::uint64_t{0} >> __builtin_clzll(word); }
 
-/// Tells for the points of all windows.
+/// Does the same for the vertices of all windows.
 template <int prisms>
 inline void tell_points(const Scan& scan, Found& found) {
   for (const Window* window = scan.windows; window < scan.windows + scan.window_count; ++window) {
@@ -95,8 +95,8 @@ inline void tell_points(const Scan& scan, Found& found) {
     for (int x = window->cells.first; x < window->cells.end; ++x) {
       const std::uint64_t active = cells.active[x], asked = active & window->cells.rows;
       if (asked == 0) continue;
-      // What lies between two rows is looked at, too.
-      // Points are numbered cell by cell, so that those of a row of cells follow one another.
+      // Vertices are numbered by cell, so those of a row are consecutive; those between two rows are
+      // included.
       const int first = popcount(active & before_first(asked)), end = popcount(active & until_last(asked));
       tell_points<prisms>(scan, window->corner,
                           cells.first_point + cells.before[x] + static_cast<std::uint32_t>(first),
@@ -108,15 +108,14 @@ inline void tell_points(const Scan& scan, Found& found) {
   }
 }
 
-/// The prisms, a bit each, that a triangle may be in, by what is certain of all its corners.
+/// Returns the prisms, one bit each, that a triangle may be in, by the certain relations of all its corners.
 inline unsigned may_be_in(unsigned certain, unsigned prisms) {
   unsigned out = 0;
   for (int what = kBeyondWall; what <= kBelowBottom; ++what) out |= certain >> (kMostPrisms * what);
   return ~out & prisms;
 }
 
-/// Writes the quads that may be in a prism, without a branch for each: a candidate that is none is
-/// overwritten.
+/// Writes the quads that may be in a prism, without branches: other quads are overwritten.
 inline int find_candidates(const Scan& scan, Candidate* out) {
   const Surface& surface = *scan.surface;
   const unsigned prisms = (1u << scan.prism_count) - 1;
@@ -130,14 +129,15 @@ inline int find_candidates(const Scan& scan, Candidate* out) {
       const std::uint64_t asked = any_axis & window->samples.rows;
       if (asked == 0) continue;
       const std::uint64_t before = before_first(asked), until = until_last(asked);
-      // Quads are numbered by word and within it by axis: those before the first row asked for are passed
-      // over, and the run ends behind the last.
+      // Quads are numbered by word and sample: skip those before the first row requested, and stop after the
+      // last.
       std::uint32_t number = block.first_quad + block.quads_before[x], end = number;
       for (const std::uint64_t word : quads) {
         number += static_cast<std::uint32_t>(popcount(word & before));
         end += static_cast<std::uint32_t>(popcount(word & until));
       }
-      // Those between two rows, of which nothing may be known, are in no prism, whatever is said of them.
+      // Quads between two rows, whose relations may be outdated, are in no prism, so the result for them is
+      // irrelevant.
       for (; number < end; ++number) {
         const std::uint32_t* quad = surface.quads[number];
         const unsigned both = surface.certain[quad[0]] & surface.certain[quad[2]];

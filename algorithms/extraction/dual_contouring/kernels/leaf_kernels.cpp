@@ -1,5 +1,5 @@
-// The loops over edges, cells and quads are plain C++ over arrays, which the compiler vectorises as wide as
-// it is told; every operation is elementwise and rounded once, so all levels give the same bytes.
+// The loops over edges, cells and quads are plain C++ over arrays, vectorised by the compiler; every
+// operation is elementwise and rounded once, so all instruction sets give the same bytes.
 #include "algorithms/extraction/dual_contouring/kernels/leaf_kernels.h"
 
 #include "algorithms/lattice/simd/bits.h"
@@ -10,20 +10,13 @@ namespace HERMESH_SIMD_LEVEL {
 namespace {
 
 using namespace simd;
-// clang-format off: the order matters
 // Each part uses those before it.
 // clang-format off
-#include "algorithms/extraction/dual_contouring/kernels/bit_numbers.inc"
-#include "algorithms/extraction/dual_contouring/kernels/signs.inc"
-#include "algorithms/extraction/dual_contouring/kernels/samples.inc"
-#include "algorithms/extraction/dual_contouring/kernels/stencil.inc"
-#include "algorithms/extraction/dual_contouring/kernels/count.inc"
-#include "algorithms/extraction/dual_contouring/kernels/cells.inc"
+#include "algorithms/extraction/dual_contouring/kernels/leaf.inc"
 #include "algorithms/extraction/dual_contouring/kernels/place_average.inc"
 #include "algorithms/extraction/dual_contouring/kernels/crossings.inc"
 #include "algorithms/extraction/dual_contouring/kernels/place_optimal.inc"
 #include "algorithms/extraction/dual_contouring/kernels/connect.inc"
-// clang-format on
 // clang-format on
 
 constexpr Kernels kKernels = {kLevel,      count,      place_average, place_optimal,

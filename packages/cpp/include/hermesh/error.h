@@ -1,4 +1,4 @@
-// The two ways in which a call ends early.
+// Exceptions of the public functions.
 #pragma once
 
 #include <exception>
@@ -8,8 +8,8 @@
 
 namespace hermesh::HERMESH_V1 {
 
-/// Bad input, or a failure that the caller can do something about. what() is one sentence, that of the
-/// program `hermesh`, that names the file or the option and says what to do.
+/// Invalid input, or a failure that the caller can fix. what() is the message of the program `hermesh`, which
+/// names the file or the option and a remedy.
 /// @snippet main.cpp error
 class HERMESH_API Error : public std::runtime_error {
  public:
@@ -17,7 +17,7 @@ class HERMESH_API Error : public std::runtime_error {
   ~Error() override;
 };
 
-/// Thrown by a call whose Context was asked to stop. Nothing half-done is left behind.
+/// Thrown by a call whose Context was cancelled. No partial file is left.
 class HERMESH_API Cancelled : public std::exception {
  public:
   ~Cancelled() override;

@@ -1,4 +1,4 @@
-// hermesh::mesher: volumes to polygons (chapter 6), and what is made of that.
+// hermesh::mesher: volumes to polygons (chapter 6), remeshing and Booleans.
 #pragma once
 
 #include <array>
@@ -6,17 +6,13 @@
 #include <string>
 #include <vector>
 
-#include "hermesh/context.h"
-#include "hermesh/export.h"
 #include "hermesh/hermite.h"
-#include "hermesh/mesh.h"
 #include "hermesh/options.h"
-#include "hermesh/volume.h"
 #include "hermesh/voxelize.h"
 
 namespace hermesh::HERMESH_V1 {
 
-/// What a camera sees: lengths in world units, the angle in degrees.
+/// The view of a camera: lengths in world units, the angle in degrees.
 struct Frustum {
   std::array<double, 3> position = {0, 0, 0}, look_at = {0, 0, -1}, up = {0, 1, 0};
   double angle = 45.0;  ///< vertical, from the lower to the upper plane
@@ -24,86 +20,85 @@ struct Frustum {
   double near = 0.1, far = 100.0;
 };
 
-/// How a volume becomes a mesh; what `hermesh extract` and `hermesh remesh` take.
+/// Options of extract() and remesh(), as of `hermesh extract` and `hermesh remesh`.
 struct ExtractOptions {
-  /// One of extractors(). Empty: manifold-dual-contouring where polygons are at hand (remesh, combine), which
-  /// is adaptive within a tolerance, closed, manifold and free of self-intersection; dual-contouring of a
-  /// volume alone.
+  /// One of extractors(). Empty: dual-contouring for a volume; for polygons (remesh, combine)
+  /// manifold-dual-contouring, which is adaptive within a tolerance, closed, manifold and free of
+  /// self-intersection.
   std::string extractor = {};
   Options options = {};   ///< of the extractor, such as {"tolerance", "0.05"} (voxels)
   double isovalue = 0.0;  ///< value of the surface, in the units of the volume
-  std::string ends =
-      "closed";  ///< where the surface runs into the end of the data: "closed" with a flat cap, or "open"
+  /// Where the surface reaches the end of the data: "closed" with a flat cap, or "open".
+  std::string ends = "closed";
 
-  /// Where an adaptive extractor keeps its bound: in a level set where it is negative, in any other volume
-  /// where it differs from the background. Nothing: everywhere. A frustum is given in its place, not beside
-  /// it.
+  /// Where an adaptive extractor keeps its bound: where a level set is negative, where any other volume
+  /// differs from its background. Empty: everywhere. Excludes a frustum.
   Volume mask = {};
   std::optional<Frustum> frustum = {};
   int frustum_resolution = 84;  ///< voxels along the longest side of the frustum's mask, 8 to 4096
-  std::string outside =
-      "simplify";  ///< outside the mask: "simplify", "nothing" (no polygons) or "everywhere" (the bound)
-  Volume tolerance_grid = {};  ///< whose values, none negative, scale the bound
+  /// Outside the mask: "simplify", "nothing" (no polygons) or "everywhere" (the bound).
+  std::string outside = "simplify";
+  Volume tolerance_grid = {};  ///< its values, none negative, scale the bound
 
-  /// Whether the mesh goes into a file of single precision (STL): what is proved of it is then proved of it
-  /// as written.
+  /// True if the mesh goes into a file of single precision (STL): guarantees then hold for the written mesh.
   bool written_in_single = false;
 };
 
-/// The extractors that there are.
+/// Returns the available extractors.
 HERMESH_API std::vector<MethodInfo> extractors();
 
-/// The surface of a volume. Where it runs into the end of the data, a note says so. The same bytes at any
+/// Returns the surface of a volume, with a note if it reaches the end of the data. The same bytes at any
 /// number of threads.
-/// `source`, if not null, is the polygons that the volume was made from, for extractors that take exact
-/// crossings.
+/// @param source the polygons that the volume was made from, for extractors that use exact crossings; may be
+/// null
 /// @snippet main.cpp extract
-/// @throws Error where there is no surface (the sentence says why), for options that there are not or that
-/// have no effect; Cancelled.
+/// @throws Error if there is no surface (with the reason), for unknown options and for options without
+/// effect; Cancelled.
 HERMESH_API Mesh extract(const Volume& volume, const ExtractOptions& options, Context& context,
                          const Mesh* source = nullptr);
-/// The surface of a solid, by an extractor that takes Hermite data. @throws Error as above; Cancelled.
+/// Returns the surface of a solid, by an extractor that takes Hermite data. @throws Error as above;
+/// Cancelled.
 HERMESH_API Mesh extract(const Solid& solid, const ExtractOptions& options, Context& context);
 
-/// Polygons to a level set and back to a mesh.
+/// Converts polygons to a level set and back to a mesh.
 /// @snippet main.cpp remesh
 /// @throws Error as voxelize() and extract(); Cancelled.
 HERMESH_API Mesh remesh(const Mesh& mesh, const VoxelizeOptions& voxelizing, const ExtractOptions& extracting,
                         Context& context);
 
-/// What a mesh is to keep to; what `hermesh remesh --error` and `--triangles` take. Exactly one of the first
-/// two is given.
+/// Options of remesh_within(), as of `hermesh remesh --error` and `--triangles`. Exactly one of the first two
+/// is given.
 struct BoundOptions {
-  std::optional<double> error = {};  ///< two-sided distance from the polygons' solid at most, world units
-  std::optional<std::size_t> triangles =
-      {};  ///< at most, at the smallest error that was found for them; at least 4
-  std::string signs = "winding-number";  ///< or "flood-fill" or "auto": what is inside
-  bool over_holes = false;               ///< whether holes may be closed, where no polygon is near
+  std::optional<double> error = {};  ///< maximum two-sided distance from the polygons' solid, world units
+  /// Maximum number of triangles, at least 4; the mesh has the smallest certified error found.
+  std::optional<std::size_t> triangles = {};
+  std::string signs = "winding-number";  ///< how the inside is found; or "flood-fill" or "auto"
+  bool over_holes = false;               ///< true if holes may be closed where no polygon is near
   double smallest_voxel = 0.0;           ///< world units; 0: an eighth of the error
-  double most_points = 3e7;              ///< of the finest mesh
+  double most_points = 3e7;              ///< maximum number of vertices of the finest mesh
   bool written_in_single = false;        ///< as in ExtractOptions
 };
 
-/// A mesh with the distances that are proved of it, world units.
+/// A mesh with its certified distances, world units.
 struct BoundedRemesh {
   Mesh mesh;
-  double error = 0.0;          ///< that was asked for or, for a budget, found
-  double to_polygons = 0.0;    ///< no place of the mesh is farther from the boundary of the polygons' solid
-  double from_polygons = 0.0;  ///< no place of that is farther from the mesh
+  double error = 0.0;          ///< the requested one or, for a budget, the one found
+  double to_polygons = 0.0;    ///< bound of the distance from the mesh to the boundary of the polygons' solid
+  double from_polygons = 0.0;  ///< bound of the distance from that boundary to the mesh
   double voxel_size = 0.0;
 };
 
-/// A mesh that is closed, manifold and free of self-intersection, with few triangles and a proved distance
-/// from the polygons.
-/// @throws Error where the bound is not reached: the sentence says where and why; Cancelled.
+/// Returns a closed, manifold mesh free of self-intersection with few triangles and a certified distance from
+/// the polygons.
+/// @throws Error if the bound cannot be reached, with location and reason; Cancelled.
 HERMESH_API BoundedRemesh remesh_within(const Mesh& mesh, const BoundOptions& options, Context& context);
 
-/// The union, intersection or difference of two meshes' solids: both on one lattice, with their exact
-/// crossings, which keep the curves where their surfaces meet. A resolution counts along the larger one. What
-/// is lost between samples is a note.
+/// Returns the union, intersection or difference of the solids of two meshes, both sampled on one lattice
+/// with exact crossings, which preserve the curves where their surfaces intersect. A resolution counts along
+/// the larger one. Adds a note if parts are lost between samples.
 /// @snippet main.cpp combine
-/// @throws Error as voxelize() and extract(), for a result that is empty or everywhere thinner than a voxel;
-/// Cancelled.
+/// @throws Error as voxelize() and extract(), and for a result that is empty or everywhere thinner than a
+/// voxel; Cancelled.
 HERMESH_API Mesh combine(Boolean operation, const Mesh& a, const Mesh& b, const VoxelizeOptions& voxelizing,
                          const ExtractOptions& extracting, Context& context);
 

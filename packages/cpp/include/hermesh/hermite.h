@@ -1,14 +1,11 @@
-// hermesh::hermite: Hermite data, the places and normals where a surface crosses the edges of a lattice
+// hermesh::hermite: Hermite data, the points and normals where a surface crosses the edges of a lattice
 // (chapter 4).
 #pragma once
 
 #include <cstddef>
-#include <filesystem>
 #include <memory>
-#include <string>
+#include <vector>
 
-#include "hermesh/context.h"
-#include "hermesh/export.h"
 #include "hermesh/mesh.h"
 #include "hermesh/volume.h"
 
@@ -16,24 +13,23 @@ namespace hermesh::HERMESH_V1 {
 
 /// A Boolean operation on two solids.
 enum class Boolean {
-  union_of,      ///< what is in either
-  intersection,  ///< what is in both
-  difference     ///< what is in the first and not in the second
+  union_of,      ///< points in either
+  intersection,  ///< points in both
+  difference     ///< points in the first and not in the second
 };
 
-/// A solid on a lattice: a level set for the signs of its samples, and its crossings. A value: copies share
-/// the data.
+/// A solid on a lattice: a level set for the signs of its samples, and its crossings. Copies share the data.
 class HERMESH_API Solid {
  public:
-  /// Nothing, whose members must not be called.
+  /// An empty object, whose members must not be called.
   Solid();
   explicit operator bool() const noexcept { return data_ != nullptr; }
 
-  /// The solid of a level set, with crossings interpolated between samples. @throws Error for values that are
-  /// not finite; Cancelled.
+  /// Returns the solid of a level set, with crossings interpolated between samples. @throws Error for values
+  /// that are not finite; Cancelled.
   static Solid of(const Volume& level_set, Context& context);
-  /// A solid with the exact crossings of the polygons that the level set was made from. @throws Error;
-  /// Cancelled.
+  /// Returns a solid with the exact crossings of the polygons that the level set was made from. @throws
+  /// Error; Cancelled.
   static Solid of(const Volume& level_set, const Mesh& source, Context& context);
 
   const Volume& level_set() const noexcept;
@@ -51,10 +47,10 @@ class HERMESH_API Solid {
   std::shared_ptr<const Data> data_;
 };
 
-/// Combines two solids on one lattice (made with the option `like`, say): a sample's sign is the Boolean of
-/// the operands', and an edge has data if and only if its ends differ. A union and an intersection do not
-/// depend on the order.
-/// @throws Error for two lattices; Cancelled.
+/// Combines two solids on one lattice (made with the option `like`, for example): a sample's sign is the
+/// Boolean of the operands', and an edge has data if and only if its ends differ. A union and an intersection
+/// do not depend on the order.
+/// @throws Error for different lattices; Cancelled.
 HERMESH_API Solid combine(Boolean operation, const Solid& a, const Solid& b, Context& context);
 
 }  // namespace hermesh::HERMESH_V1

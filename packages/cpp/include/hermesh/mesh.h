@@ -15,7 +15,7 @@
 
 namespace hermesh::HERMESH_V1 {
 
-/// What an attribute has a value for.
+/// The elements that have a value of an attribute.
 enum class AttributeDomain {
   point,   ///< each point
   corner,  ///< each polygon's corner: three a triangle, in their order, then four a quad
@@ -23,32 +23,28 @@ enum class AttributeDomain {
 };
 
 /// Named values on the points, corners or polygons of a mesh, such as "normal", "colour", "uv" or "material".
-/// It is a view: whoever makes one keeps the arrays alive, and those that a mesh gives live as long as it or
-/// a copy of it.
+/// It is a view: the caller keeps the arrays alive, and those of a mesh live as long as it or a copy of it.
 struct Attribute {
   std::string name = {};
   AttributeDomain domain = AttributeDomain::point;
-  int components = 1;                  ///< numbers for each element, 1 to 4, side by side
-  std::span<const float> floats = {};  ///< the values, of one kind; the other is empty
-  std::span<const std::int32_t> integers =
-      {};  ///< whole numbers of one component, never interpolated; −1 stands for "none"
-  std::vector<std::string> labels = {};  ///< names of the whole numbers from 0 on; may be empty
+  int components = 1;                           ///< numbers for each element, 1 to 4, side by side
+  std::span<const float> floats = {};           ///< the values, of one kind; the other is empty
+  std::span<const std::int32_t> integers = {};  ///< one component, never interpolated; −1 means "none"
+  std::vector<std::string> labels = {};         ///< names of the integers from 0 on; may be empty
 };
 
-/// Triangles and quads over shared points, counter-clockwise seen from outside, and their attributes. A
-/// value: nobody changes a mesh once it is made, and copies share the arrays, so that to copy one costs
-/// nothing.
+/// Triangles and quads over shared points, counter-clockwise seen from outside, and their attributes. A mesh
+/// is immutable, and copies share the arrays, so copying is cheap.
 ///
-/// A quad (a, b, c, d) of a mesh that hermesh made means the triangles abc and acd. How quads from elsewhere
-/// are cut is not known, so that whatever samples polygons (voxelize, remesh, combine, fracture, and extract
-/// from its source) cuts each along its better diagonal, as the program does; to keep your own cut, give
-/// triangles.
+/// A quad (a, b, c, d) of a mesh made by hermesh means the triangles abc and acd. The split of other quads is
+/// unknown: functions that sample polygons (voxelize, remesh, combine, fracture, and extract from its source)
+/// split each along its better diagonal, as the program does; give triangles to prescribe a split.
 class HERMESH_API Mesh {
  public:
   /// No points, no polygons.
   Mesh();
 
-  /// A mesh of arrays, which are copied once.
+  /// Makes a mesh of arrays, which are copied once.
   /// @snippet main.cpp arrays
   /// @param points x, y, z of each point, world units
   /// @param triangles three numbers of points each, from 0
@@ -59,25 +55,24 @@ class HERMESH_API Mesh {
   /// of its own, and an attribute whose number of values does not fit.
   explicit Mesh(std::span<const float> points, std::span<const std::uint32_t> triangles,
                 std::span<const std::uint32_t> quads = {}, std::span<const Attribute> attributes = {});
-  /// A mesh of points in double precision, which are kept in single precision about origin(), so that a
-  /// model far from 0 loses nothing that matters. @throws Error as above.
+  /// Makes a mesh of points in double precision, which are stored in single precision relative to origin(),
+  /// so that a model far from 0 loses no relevant precision. @throws Error as above.
   explicit Mesh(std::span<const double> points, std::span<const std::uint32_t> triangles,
                 std::span<const std::uint32_t> quads = {}, std::span<const Attribute> attributes = {});
 
   /// x, y, z of each point, world units, relative to origin(). The arrays of a mesh live as long as it or a
   /// copy of it.
   std::span<const float> points() const noexcept;
-  /// Where points() have their zero, world units; (0, 0, 0) unless the mesh lies far from it, compared with
-  /// its size.
+  /// The zero of points(), world units; (0, 0, 0) unless the mesh lies far from it, compared with its size.
   std::array<double, 3> origin() const noexcept;
-  /// x, y, z of each point in world units, in an array of the caller's own.
+  /// Returns x, y, z of each point in world units.
   std::vector<double> world_points() const;
   std::span<const std::uint32_t> triangles() const noexcept;  ///< three numbers of points each
   std::span<const std::uint32_t> quads() const noexcept;      ///< four numbers of points each
   std::vector<Attribute> attributes() const;                  ///< views of the mesh's own arrays
 
-  /// A mesh of the same polygons with these attributes in place of their own; all arrays are copied. @throws
-  /// Error for an attribute whose number of values does not fit.
+  /// Returns a mesh of the same polygons whose attributes are replaced by these; all arrays are copied.
+  /// @throws Error for an attribute with a wrong number of values.
   Mesh with_attributes(std::span<const Attribute> attributes) const;
 
   std::size_t point_count() const noexcept { return points().size() / 3; }
@@ -92,16 +87,16 @@ class HERMESH_API Mesh {
   std::shared_ptr<const Arrays> arrays_;
 };
 
-/// Reads PLY (ASCII, binary), OBJ, OFF (text, binary), STL, glTF 2.0 or 3MF, each also gzipped, told by the
-/// name's end and checked against the content. Polygons of more corners are cut into triangles. What was
-/// forgiven is a note. With `attributes` those of PLY and OBJ are read, too.
+/// Reads PLY (ASCII, binary), OBJ, OFF (text, binary), STL, glTF 2.0 or 3MF, each also gzipped. The ending of
+/// the name gives the format. Polygons of more corners are split into triangles. Adds a note for each
+/// tolerated fault. With `attributes` those of PLY and OBJ are read, too.
 /// @throws Error for a file that is missing, damaged, of another type or without polygons; Cancelled.
 HERMESH_API Mesh read_mesh(const std::filesystem::path& path, Context& context, bool attributes = false);
 
-/// Writes PLY (binary), OBJ, OFF, STL, glTF (.glb, .gltf) or 3MF, as the name ends, beside the path and
-/// renames, so that no half-written file stands there. Reading the file back gives the same points; but STL
-/// has single precision, and a note says what that cost. PLY alone keeps attributes.
-/// @throws Error for an unknown end of the name or a path that cannot be written; Cancelled.
+/// Writes PLY (binary), OBJ, OFF, STL, glTF (.glb, .gltf) or 3MF, by the ending of the name, in an atomic
+/// way. The file has the same points, except for STL, which has single precision; a note gives the loss. Only
+/// PLY stores attributes.
+/// @throws Error for an unknown ending or a path that cannot be written; Cancelled.
 HERMESH_API void write_mesh(const std::filesystem::path& path, const Mesh& mesh, Context& context);
 
 }  // namespace hermesh::HERMESH_V1

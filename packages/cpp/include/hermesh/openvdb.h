@@ -1,5 +1,4 @@
-// Volumes as OpenVDB's grids and back, for programs that use OpenVDB themselves; no other header includes
-// this.
+// Volumes as OpenVDB's grids and back, for programs that use OpenVDB; no other header includes this one.
 #pragma once
 
 #include <openvdb/openvdb.h>
@@ -9,12 +8,11 @@
 
 namespace hermesh::HERMESH_V1 {
 
-/// The grid inside a volume, which nobody may change: make a deepCopy() to do so. @throws Error for a volume
-/// of nothing.
+/// Returns the immutable grid of a volume; use deepCopy() to change it. @throws Error for an empty volume.
 HERMESH_API openvdb::GridBase::ConstPtr to_openvdb(const Volume& volume);
 
-/// A volume of a grid, which is shared and which nobody may change from then on. Grids of half and double
-/// precision, whole numbers, bool and masks become floats. @throws Error for a null pointer.
+/// Returns a volume of a grid, which is shared and must not change from then on. Grids of half and double
+/// precision, integers, bool and masks become floats. @throws Error for a null pointer.
 HERMESH_API Volume from_openvdb(const openvdb::GridBase::ConstPtr& grid);
 
 }  // namespace hermesh::HERMESH_V1

@@ -1,4 +1,4 @@
-// Options of the methods that there are, by the names of the command line.
+// Options of the extractors and voxelizers, by the names of the command line.
 #pragma once
 
 #include <map>
@@ -10,8 +10,8 @@
 namespace hermesh::HERMESH_V1 {
 
 /// Options of an extractor or a voxelizer, name to value, as `-o name=value` gives them to the program.
-/// Names, values and defaults are those of extractors() and voxelizers(). @throws Error (whoever takes them)
-/// for a name or value that there is not, and for one that has no effect beside the others.
+/// Names, values and defaults are those of extractors() and voxelizers(). The functions that take them throw
+/// Error for an unknown name or value, and for an option without effect.
 using Options = std::map<std::string, std::string>;
 
 /// An option of a method.
@@ -24,7 +24,7 @@ struct OptionInfo {
 /// A method, by the name that `--extractor` or `--voxelizer` takes.
 struct MethodInfo {
   std::string name = {}, summary = {};
-  /// What an extractor's mesh is for every input.
+  /// Guarantees of an extractor for every input.
   bool closed = false, manifold = false, oriented = false, free_of_self_intersection = false;
   std::vector<OptionInfo> options = {};
 };

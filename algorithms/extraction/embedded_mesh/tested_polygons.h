@@ -1,0 +1,72 @@
+// Polygons that the arguments of uniform_mesh.h do not cover, tested for contact with all others nearby:
+// those of cells of several sheets or with ambiguous faces, and those of vertices that leave their cells
+// late.
+#pragma once
+
+#include <Eigen/Core>
+#include <vector>
+
+#include "algorithms/extraction/embedded_mesh/edge_polygons.h"
+#include "algorithms/extraction/embedded_mesh/file_points.h"
+#include "algorithms/extraction/embedded_mesh/uniform_points.h"
+
+namespace hermesh {
+
+/// Largest distance of any vertex from its cell along an axis, in voxels. It bounds where the polygons near a
+/// position may start, so that they are found through the lattice.
+inline constexpr double kFarthestFromCell = 1.0;
+
+/// Appends the vertices of fanned edges to those of the cells: at their crossings or, if rounding forbids
+/// that, as near to them as the tetrahedra of the fan allow (uniform_mesh.h).
+void place_crossings(const CellBlocks& cells, const EdgePolygons& polygons, const FilePoints& file,
+                     UniformPoints& points, RunContext& context);
+
+/// Calls place_crossings(), and holds to their segments the cells of several sheets or at ambiguous faces
+/// whose unconstrained polygons intersect others (triangle_contact.h) or leave an edge with four polygons.
+/// The cells around the edges of intersecting polygons are held first, and cells farther away only if there
+/// are none: in white noise this holds one cell in a hundred, where holding all that have many of their kind
+/// around held two in five. Held cells that still intersect others, because their crossings are rounded, are
+/// centred. Joints of several sheets are tested as well, but cannot be held.
+///
+/// Afterwards no two polygons intersect: for edges without a tested cell by the argument of uniform_mesh.h,
+/// and any other polygon has been tested, in its final form, against all polygons nearby.
+/// @param cells cells of the lattice
+/// @param polygons forms of the edges; its cells are held
+/// @param file rounds positions to the file's precision
+/// @param points the cells' vertices, which move if a cell is centred; those of fanned edges are appended
+/// @param farthest distance of any vertex from its cell along an axis, voxels
+/// @param context receives the progress and the request to cancel
+/// @returns the joints of several sheets near polygons that intersect although nothing else can be held, each
+///   once; nearly always none
+/// @throws Cancelled
+std::vector<CellBlocks::Cell> hold_cells_that_meet(const CellBlocks& cells, EdgePolygons& polygons,
+                                                   const FilePoints& file, UniformPoints& points,
+                                                   double farthest, RunContext& context);
+
+/// The preferred position, outside the cell, of the vertex of a cell of one sheet or of a joint.
+struct PointTarget {
+  int cell;
+  Eigen::Vector3d place;
+  Eigen::Vector3d nearer;  ///< as near to the planes, but nearer to the vertex's position within the cell
+};
+
+/// Moves vertices to their targets, or part of the way. The rule of tetrahedra (uniform_mesh.h) is sufficient
+/// for an embedded mesh, but not necessary: here a vertex moves if its polygons would intersect neither each
+/// other nor any polygon nearby (triangle_contact.h), so an embedded mesh remains embedded. `targets` are by
+/// block; those already reached, and those in crowded cells (EdgePolygons::is_crowded()), are skipped. The
+/// result does not depend on the number of threads.
+///
+/// **Orientation.** A vertex moves in one step, so a mesh that is embedded before and after it may have
+/// passed through itself: a small body, or a small piece of a fracture, is inverted if its vertex leaves it
+/// through the opposite side. The polygons around the vertex before the move, reversed, and those after it
+/// bound a closed surface. Let q be a point on a polygon of the same closed component that does not have the
+/// vertex, and k the winding number of that surface about q. Before the move the winding number of the
+/// component is 1 on one side of q and 0 on the other; afterwards both differ by k. As the mesh is embedded
+/// after the move, too, its orientation is unchanged if and only if k is 0. A vertex moves only if k is 0 for
+/// each piece whose boundary it is on.
+/// @throws Cancelled
+void move_points(const CellBlocks& cells, const EdgePolygons& polygons,
+                 const std::vector<std::vector<PointTarget>>& targets, const FilePoints& file,
+                 UniformPoints& points, RunContext& context);
+
+}  // namespace hermesh

@@ -1,6 +1,0 @@
-#include "algorithms/hermite/dense/dense_tree.h"
-
-HERMESH_INSTANTIATE_TREE(template, hermesh::FloatDenseTree)
-HERMESH_INSTANTIATE_TREE(template, hermesh::DirectedDenseTree)
-HERMESH_INSTANTIATE_TREE(template, hermesh::ThesisDenseTree)
-HERMESH_INSTANTIATE_TREE(template, hermesh::FixedDenseTree)

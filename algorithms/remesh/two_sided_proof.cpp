@@ -1,0 +1,134 @@
+#include "algorithms/remesh/two_sided_proof.h"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <numeric>
+#include <utility>
+
+namespace hermesh {
+namespace {
+
+/// Radius of the pieces of polygons that are tested for bounding something, in errors.
+constexpr double kFreePiece = 1.0 / 16.0;
+/// The first limit that is tried, and the step beyond the largest distance found, in errors.
+constexpr double kFirstLimit = 0.8, kLimitStep = 0.02;
+
+}  // namespace
+
+double area(const std::vector<Eigen::Vector3f>& points, const Triangle& t) {
+  const Eigen::Vector3d a = points[t[0]].cast<double>(), b = points[t[1]].cast<double>(),
+                        c = points[t[2]].cast<double>();
+  return 0.5 * (b - a).cross(c - a).norm();
+}
+
+SolidSurface surface_of(BoundaryTriangles boundary, std::span<const std::int8_t> turns, bool over_holes) {
+  SolidSurface surface{std::move(boundary.points), {}, {}};
+  for (std::size_t i = 0; i < boundary.triangles.size(); ++i) {
+    const Triangle& t = boundary.triangles[i];
+    if (boundary.ids[i] < 0) {
+      surface.caps.push_back(t);
+      surface.cap_area += area(surface.points, t);
+    } else if (turns.empty() || turns[static_cast<std::size_t>(boundary.ids[i])] != 0) {
+      surface.triangles.push_back(t);
+      surface.area += area(surface.points, t);
+    }
+  }
+  if (over_holes) surface.triangles.insert(surface.triangles.end(), surface.caps.begin(), surface.caps.end());
+  return surface;
+}
+
+TwoSidedProof::TwoSidedProof(const PolygonMesh& mesh, double error, bool by_winding, bool keeps_open)
+    : error_(error), rounding_(kOffSurface * bounds(mesh).size().norm()), keeps_open_(keeps_open) {
+  if (by_winding) winding_.emplace(IndexSoup(mesh, 1.0));
+}
+
+std::span<const std::int8_t> TwoSidedProof::turns() const {
+  return winding_ ? std::span<const std::int8_t>(winding_->orientation().turns)
+                  : std::span<const std::int8_t>();
+}
+
+bool TwoSidedProof::bounds_nothing(const std::array<Eigen::Vector3d, 3>& piece) const {
+  const Eigen::Vector3d normal = (piece[1] - piece[0]).cross(piece[2] - piece[0]).normalized();
+  if (!normal.allFinite() || normal.isZero()) return true;  // it has no area
+  const Eigen::Vector3d middle = (piece[0] + piece[1] + piece[2]) / 3.0, step = rounding_ * normal;
+  const bool before = winding_->number().at(middle + step) > 0.5,
+             behind = winding_->number().at(middle - step) > 0.5;
+  return before == behind && (before || !keeps_open_);
+}
+
+bool TwoSidedProof::bounds_nothing(const SolidSurface& surface, const Far& at) const {
+  if (!winding_) return false;
+  const Triangle& t = surface.triangles[at.triangle];
+  std::array<Eigen::Vector3d, 3> piece;
+  for (int i = 0; i < 3; ++i) {
+    const Eigen::Vector3d from_corner = surface.points[t[i]].cast<double>() - at.place;
+    // Normals mean nothing on the triangle's edges, so a small piece next to the corner is tested.
+    piece[i] =
+        at.place + std::min(1.0, kFreePiece * error_ / std::max(from_corner.norm(), 1e-300)) * from_corner;
+  }
+  return bounds_nothing(piece);
+}
+
+TwoSidedDistance TwoSidedProof::compare(std::span<const Eigen::Vector3f> points,
+                                        const std::vector<Triangle>& triangles, const Eigen::Vector3d& offset,
+                                        const SolidSurface& surface, const SurfaceDistance& to,
+                                        const SurfaceDistance& from, Wanted wanted,
+                                        const RunContext& context) const {
+  FreePieces free;
+  if (winding_)
+    free = {.is_free = [this](const std::array<Eigen::Vector3d, 3>& piece) { return bounds_nothing(piece); },
+            .radius = kFreePiece * error_};
+  const auto hold = [&](const SurfaceDistance& other, std::span<const Eigen::Vector3f> of,
+                        const Eigen::Vector3d& shift, const std::vector<Triangle>& held,
+                        const FreePieces& may_be_free) {
+    return wanted == Wanted::any_bound
+               ? other.hold(of, shift, held, error_, context, may_be_free, Wanted::any_bound)
+               : smallest_bound(other, of, shift, held, may_be_free, context);
+  };
+  const DistanceFromSurface there = hold(to, points, offset, triangles, {}),
+                            back = hold(from, surface.points, -offset, surface.triangles, free);
+  TwoSidedDistance result{there.upper, back.upper, back.free_area, {}};
+  for (const FarTriangle& f : there.far) result.far.push_back({f.place + offset, f.distance, false});
+  for (const FarTriangle& f : back.far) result.far.push_back({f.place, f.distance, true, f.triangle});
+  return result;
+}
+
+/// Returns SurfaceDistance::hold() with the smallest limit, to some hundredths of the error, that holds and
+/// is at most the error.
+DistanceFromSurface TwoSidedProof::smallest_bound(const SurfaceDistance& to,
+                                                  std::span<const Eigen::Vector3f> points,
+                                                  const Eigen::Vector3d& offset,
+                                                  std::vector<Triangle> triangles, const FreePieces& free,
+                                                  const RunContext& context) const {
+  DistanceFromSurface all;
+  std::vector<std::uint32_t> numbers(triangles.size());
+  std::iota(numbers.begin(), numbers.end(), 0u);
+  for (double limit = kFirstLimit * error_;;) {
+    const bool is_last = limit >= error_;
+    if (is_last) limit = error_;
+    // Before the last limit nothing is free, because a far piece may still be near enough.
+    DistanceFromSurface now =
+        to.hold(points, offset, triangles, limit, context, is_last ? free : FreePieces{});
+    all.upper = std::max(all.upper, now.upper);
+    all.free_area += now.free_area;
+    // Only triangles beyond this limit are compared with the next.
+    std::vector<Triangle> left;
+    std::vector<std::uint32_t> left_numbers;
+    double farthest = limit;
+    for (FarTriangle& f : now.far) {
+      left.push_back(triangles[f.triangle]);
+      f.triangle = numbers[f.triangle];
+      left_numbers.push_back(f.triangle);
+      farthest = std::max(farthest, f.distance);
+    }
+    if (is_last || now.far.empty()) {
+      all.far = std::move(now.far);
+      return all;
+    }
+    triangles = std::move(left);
+    numbers = std::move(left_numbers);
+    limit = farthest + kLimitStep * error_;
+  }
+}
+
+}  // namespace hermesh

@@ -1,0 +1,216 @@
+#include "experiments/cli/conversions.h"
+
+#include <algorithm>
+
+#include "algorithms/core/quad_diagonals.h"
+#include "algorithms/core/run_context.h"
+#include "algorithms/io/mesh_file.h"
+#include "algorithms/lattice/memory_estimate.h"
+#include "algorithms/voxelization/outputs/lost_surface.h"
+#include "experiments/cli/cli11.h"
+#include "experiments/cli/help.h"
+#include "experiments/variants.h"
+
+namespace hermesh::cli {
+namespace {
+
+/// Refuses a name that the table lacks if it is close to one that it has. @throws Error with `message` and
+/// the suggestion.
+template <class Named>
+void refuse_misspelled(const std::vector<Named>& table, const std::string& given,
+                       const std::string& message) {
+  std::vector<std::string> names;
+  for (const Named& entry : table) names.push_back(entry.name);
+  if (std::ranges::find(names, given) != names.end()) return;
+  if (const std::string meant = did_you_mean(given, names); !meant.empty()) throw Error(message + meant);
+}
+
+/// Returns the method of that name with its options, given as key=value. @throws UsageError
+template <class Method>
+auto chosen_from(const std::vector<Method>& table, const std::string& kind, const std::string& name,
+                 const std::vector<std::string>& texts) {
+  return as_usage([&] {
+    refuse_misspelled(table, name, "there is no " + kind + " '" + name + "'");
+    const Method& method = find_variant(table, name);
+    GivenOptions given;
+    for (const std::string& text : texts) {
+      const auto option = parse_option(text);
+      if (!given.insert(option).second)
+        throw Error("option '" + option.first + "' of " + name + " is given twice");
+    }
+    for (const auto& [option, value] : given)
+      refuse_misspelled(method.options, option, name + " has no option '" + option + "'");
+    return hermesh::choose(table, name, given);
+  });
+}
+
+}  // namespace
+
+void VoxelizeArguments::choose() {
+  std::vector<std::string> all = options;
+  if (signs) all.push_back("signs=" + *signs);
+  // Open sheets are kept if thin parts are.
+  const bool has_signs = std::ranges::any_of(all, [](const auto& o) { return o.starts_with("signs="); });
+  if (voxelizer == "hermesh" && !has_signs && thin.value_or("keep") == "keep")
+    all.push_back("signs=auto-sheets");
+  chosen = chosen_from(all_voxelizers(), "voxelizer", voxelizer, all);
+}
+
+void ExtractorArguments::choose() { chosen = chosen_from(all_extractors(), "extractor", extractor, options); }
+
+ThinRule VoxelizeArguments::thin_rule(double isovalue) const {
+  if (thin == "drop") return ThinRule::drop;
+  const char* reason = chosen.voxelizer.name != "hermesh"       ? "the voxelizer is not hermesh"
+                       : chosen.options.is("signs", "unsigned") ? "unsigned distances have no inside"
+                       : isovalue != 0.0 ? "the surface of the isovalue is not that of the polygons"
+                                         : nullptr;
+  if (reason && thin) throw UsageError("--thin " + *thin + " has no effect: " + reason);
+  if (reason) return ThinRule::drop;
+  return thin == "refuse" ? ThinRule::refuse : ThinRule::keep;
+}
+
+VoxelizeRecipe VoxelizeArguments::recipe(const PolygonMesh& mesh, const std::string& file) const {
+  const double longest_side = bounds(mesh).size().maxCoeff();
+  if (voxel_size && *voxel_size > longest_side && !any_size)
+    throw Error("'" + file + "' is smaller than a voxel: its longest side is " + text(longest_side) +
+                " and --voxel-size is " + text(*voxel_size) +
+                " (world units, metres if --units is given); use smaller voxels");
+  if (!voxel_size && !(longest_side > 0.0))
+    throw Error("'" + file + "' has no extent, so --resolution gives no voxel size; use --voxel-size");
+  return {.chosen = chosen,
+          .voxel_size = voxel_size ? *voxel_size : longest_side / static_cast<double>(*resolution),
+          .exterior_band = exterior_band,
+          .interior_band = interior_band};
+}
+
+CLI::App* add_voxelize_options(CLI::App& command, VoxelizeArguments& arguments, bool with_like) {
+  CLI::Option_group* size = command.add_option_group("Voxel size, exactly one of");
+  size->add_option("--voxel-size", arguments.voxel_size, "Edge length of a voxel in world units")
+      ->check(finite_number(std::numeric_limits<double>::min(), "a finite number above 0"));
+  size->add_option("--resolution", arguments.resolution, "Voxels along the longest side of the mesh")
+      ->transform(whole_number(1, std::int64_t(1) << 40));
+  if (with_like)
+    size->add_option("--like", arguments.like,
+                     "A .vdb whose first float grid gives voxel size, rotation and position, so that both "
+                     "volumes share one lattice");
+  size->require_option(1);
+  command.add_option("--voxelizer", arguments.voxelizer,
+                     "Name of the voxelizer, see hermesh list (default: " + arguments.voxelizer + ")");
+  command.add_option(
+      "--signs", arguments.signs,
+      "How the voxelizer hermesh finds the inside: auto (default), flood-fill, winding-number, "
+      "or unsigned for none; short for --voxelizer-option signs=...");
+  command
+      .add_option("--thin", arguments.thin,
+                  "Walls, wires and open sheets thinner than the voxels: keep (default) thickens them until "
+                  "they appear, drop loses them, refuse is an error")
+      ->check(CLI::IsMember({"keep", "drop", "refuse"}));
+  command
+      .add_option("--voxelizer-option", arguments.options,
+                  "key=value, an option of the voxelizer, see hermesh list; may be repeated")
+      ->allow_extra_args(false);
+  // Both ends of an edge that the surface crosses are at most a voxel away from it.
+  const auto band = finite_number(1.0, "a finite number of voxels of at least 1");
+  command
+      .add_option("--exterior-band", arguments.exterior_band,
+                  "Width of the band outside, in voxels (default: 3; 1 suffices for marching cubes and is "
+                  "faster)")
+      ->check(band);
+  command
+      .add_option("--interior-band", arguments.interior_band,
+                  "Width of the band inside, in voxels (default: 3; as --exterior-band)")
+      ->check(band);
+  return size;
+}
+
+void add_extractor_options(CLI::App& command, ExtractorArguments& arguments, const std::string& fallback) {
+  arguments.extractor = fallback;
+  command.add_option("--extractor", arguments.extractor,
+                     "Name of the extractor, see hermesh list (default: " + fallback + ")");
+  command.add_option("-o", arguments.options, "key=value, an option of the extractor; may be repeated")
+      ->allow_extra_args(false)
+      // In other programs -o often names the output.
+      ->check([](const std::string& given) {
+        return given.find('=') != std::string::npos ? std::string()
+                                                    : "takes key=value, an option of a method, not '" +
+                                                          given + "'; name the output without -o";
+      });
+}
+
+PolygonMesh polygons_of(MeshFile&& file, const std::string& path, const Session& session) {
+  if (session.scale != 1.0) {
+    // In double precision, so that each point is rounded once.
+    for (Eigen::Vector3d& point : file.points) point *= session.scale;
+    if (file.origin) *file.origin *= session.scale;
+  }
+  PolygonMesh mesh = about_file(path, [&] { return to_polygon_mesh(std::move(file)); });
+  choose_diagonals(mesh);
+  return mesh;
+}
+
+PolygonMesh read_polygons(const std::string& path, Session& session, const ReadOptions& options) {
+  return polygons_of(read_mesh_file(path, session.context, options), path, session);
+}
+
+LevelSet voxelize(const PolygonMesh& mesh, const std::string& file, const VoxelizeArguments& arguments,
+                  Session& session) {
+  const VoxelizeRecipe recipe = arguments.recipe(mesh, file);
+  const VoxelizationInput input = voxelization_input(mesh, recipe, session.context);
+  about_file(file, [&] {
+    check_voxelization_fits(mesh, input.voxel_size, input.exterior_band, input.interior_band);
+  });
+  Stopwatch watch;
+  LevelSet level_set = hermesh::voxelize(mesh, recipe, session.context);
+  session.context.check();
+  const Voxelizer& voxelizer = arguments.chosen.voxelizer;
+  print_voxelized(session, file, input, level_set.active_voxels(), voxelizer.name, watch.seconds());
+  if (arguments.thin_rule() == ThinRule::drop) note_lost_surface(mesh, level_set, voxelizer, session.context);
+  return level_set;
+}
+
+PolygonSolid sample_polygons(const PolygonMesh& mesh, const std::string& file,
+                             const VoxelizeArguments& arguments, Session& session) {
+  const LevelSet level_set = voxelize(mesh, file, arguments, session);
+  PolygonSolid made =
+      about_file(file, [&] { return solid_of(mesh, level_set, arguments.thin_rule(), session.context); });
+  note_thin_parts(made.thin, level_set.voxel_size(), session);
+  return made;
+}
+
+void print_voxelized(Session& session, const std::string& file, const VoxelizationInput& input,
+                     std::size_t active_voxels, const std::string& voxelizer, double seconds) {
+  made(session, "polygons", input.mesh.triangle_count());
+  made(session, "voxels", active_voxels);
+  made(session, "voxel_size", input.voxel_size);
+  made(session, "voxelizer", voxelizer);
+  print_summary(session, "voxelized " + file + ": " + std::to_string(input.mesh.triangle_count()) +
+                             " triangles, " + std::to_string(active_voxels) + " voxels of " +
+                             text(input.voxel_size) + ", " + voxelizer + ", " + seconds_text(seconds));
+}
+
+void print_extracted(Session& session, const PolygonMesh& mesh, const std::string& extractor,
+                     double seconds) {
+  made(session, "points", mesh.points.size());
+  made(session, "triangles", mesh.triangle_count());
+  made(session, "quads", mesh.quads.size());
+  made(session, "extractor", extractor);
+  print_summary(session, "extracted " + std::to_string(mesh.points.size()) + " points, " +
+                             std::to_string(mesh.triangles.size()) + " triangles, " +
+                             std::to_string(mesh.quads.size()) + " quads, " + extractor + ", " +
+                             seconds_text(seconds));
+}
+
+void note_thin_parts(const std::optional<ThinParts>& thin, double voxel_size, Session& session) {
+  const ThinParts parts = thin.value_or(ThinParts{.area = 1.0});
+  made(session, "thickened_share", parts.thickened_area / parts.area);
+  made(session, "thickened_by", parts.thickest);
+  made(session, "thinnest_wall", parts.thinnest_wall);
+  made(session, "merged_share", parts.merged_area / parts.area);
+  if (thin) session.context.note(thin_note(*thin, voxel_size));
+}
+
+void write_output(const std::string& path, const PolygonMesh& mesh, Session& session) {
+  (session.units.empty() ? write_mesh : write_mesh_in_metres)(path, mesh, session.context);
+}
+
+}  // namespace hermesh::cli

@@ -1,0 +1,81 @@
+// Options and steps of the commands that convert polygons to volumes and volumes to meshes.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "algorithms/remesh/thin_parts.h"
+#include "experiments/cli/session.h"
+#include "experiments/pipeline.h"
+
+namespace hermesh::cli {
+
+inline constexpr const char* kMeshIn =
+    "Mesh: .ply .obj .off .stl .glb .gltf .3mf, also with .gz, or - for the standard input";
+inline constexpr const char* kMeshOut =
+    "Mesh: .ply .obj .off .stl .glb .gltf .3mf, also with .gz, or - for the standard output";
+
+struct VoxelizeArguments {
+  std::optional<double> voxel_size;                 ///< world units
+  std::optional<std::int64_t> resolution;           ///< voxels along the longest side of the mesh
+  std::optional<std::string> like;                  ///< .vdb file whose lattice the volume shares
+  bool any_size = false;                            ///< true if the mesh may be smaller than a voxel
+  double exterior_band = 3.0, interior_band = 3.0;  ///< voxels
+  std::string voxelizer = "hermesh";
+  std::optional<std::string> signs;  ///< short for the voxelizer's option `signs`
+  std::vector<std::string> options;  ///< key=value
+  std::optional<std::string> thin;   ///< keep, drop or refuse; none: keep if possible
+  ChosenVoxelizer chosen = {};       ///< set by choose()
+
+  /// Looks up the voxelizer and checks its options. @throws UsageError for an unknown name, option or value.
+  void choose();
+  /// Returns the requested treatment of thin parts, or to keep them if possible. @throws UsageError if they
+  /// cannot be kept although that was requested.
+  ThinRule thin_rule(double isovalue = 0.0) const;
+  /// Returns the input of the voxelizer, with the voxel size in world units.
+  /// @throws Error if the mesh of `file` is smaller than a voxel, or if it has no extent and a resolution was
+  /// requested.
+  VoxelizeRecipe recipe(const PolygonMesh& mesh, const std::string& file) const;
+};
+
+struct ExtractorArguments {
+  std::string extractor;             ///< set by add_extractor_options()
+  std::vector<std::string> options;  ///< key=value
+  ChosenExtractor chosen = {};       ///< set by choose()
+
+  /// Looks up the extractor and checks its options. @throws UsageError for an unknown name, option or value.
+  void choose();
+};
+
+/// Adds the options of VoxelizeArguments, --like only if `with_like`. Returns the group of those that
+/// determine the voxel size, exactly one of which is required.
+CLI::App* add_voxelize_options(CLI::App& command, VoxelizeArguments& arguments, bool with_like = false);
+void add_extractor_options(CLI::App& command, ExtractorArguments& arguments, const std::string& fallback);
+
+/// Reads a mesh to voxelize, in world units (session.scale), with quads cut along the better diagonal.
+/// @throws Error if it cannot be read.
+PolygonMesh read_polygons(const std::string& path, Session& session, const ReadOptions& options = {});
+/// Returns the polygons of a file that was read from `path`, as read_polygons() does.
+PolygonMesh polygons_of(MeshFile&& file, const std::string& path, const Session& session);
+
+/// Voxelizes the mesh of `file` and prints a line of summary. @throws Error as the voxelizer and
+/// VoxelizeArguments::recipe().
+LevelSet voxelize(const PolygonMesh& mesh, const std::string& file, const VoxelizeArguments& arguments,
+                  Session& session);
+/// Voxelizes the mesh of `file` and samples its polygons; treats thin parts by thin_rule() and notes the
+/// thickened ones.
+PolygonSolid sample_polygons(const PolygonMesh& mesh, const std::string& file,
+                             const VoxelizeArguments& arguments, Session& session);
+
+void print_voxelized(Session& session, const std::string& file, const VoxelizationInput& input,
+                     std::size_t active_voxels, const std::string& voxelizer, double seconds);
+void print_extracted(Session& session, const PolygonMesh& mesh, const std::string& extractor, double seconds);
+
+/// Notes which parts of the polygons were thickened; none if `thin` is empty.
+void note_thin_parts(const std::optional<ThinParts>& thin, double voxel_size, Session& session);
+
+/// Writes the mesh, with the unit of its coordinates if --units is given and the format stores one.
+void write_output(const std::string& path, const PolygonMesh& mesh, Session& session);
+
+}  // namespace hermesh::cli
