@@ -231,7 +231,7 @@ class Ring {
   }
 
   bool is_ear(std::uint32_t at) const {
-    // The triangle of a straight corner would have no area; next_to_cut() takes one only if there is no ear.
+    // A straight corner gives a triangle without area; next_to_cut() cuts one only if the polygon has no ear.
     if (area_at(at) <= 0) return false;
     const Vector2d &a = places_[before_[at]], &b = places_[at], &c = places_[next_[at]];
     return !reflex_.any_in(a, b, c, [&](std::uint32_t i) {

@@ -47,7 +47,7 @@ class FieldEvaluator {
  private:
   Eigen::Vector3d world(const std::array<std::int32_t, 3>& lower, const Eigen::Vector3d& local) const;
 
-  AdaptivityField::Outside outside_ = AdaptivityField::Outside::everywhere;  ///< also if there is no mask
+  AdaptivityField::Outside outside_ = AdaptivityField::Outside::everywhere;  ///< the value without a mask
   LevelSet mask_, scale_;
   IndexToWorld placement_;
   bool is_level_set_ = false;

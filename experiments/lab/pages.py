@@ -147,9 +147,11 @@ def orphans(text, plain):
     """Returns [(line, number)] for each number of a page that is in no marker, code, link, or phrase of
     `plain`.
 
-    Years, and numbers of chapters, sections, tables, figures, equations and algorithms, do not count.
+    Years, and numbers of chapters, sections, tables, figures, equations and algorithms, do not count. A phrase may
+    be broken between lines.
     """
-    return typed_numbers(text, [MARKER.pattern, *HIDDEN, *map(re.escape, plain), NAMES, PLACES], NUMBER)
+    phrases = [re.escape(phrase).replace(r"\ ", r"\s+") for phrase in plain]
+    return typed_numbers(text, [MARKER.pattern, *HIDDEN, *phrases, NAMES, PLACES], NUMBER)
 
 
 def hash_line(root, table):

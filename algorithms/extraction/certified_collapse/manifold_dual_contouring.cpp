@@ -33,7 +33,7 @@ const OptionTable<Nearness>& nearness_option_table() {
           .number(
               "moment", &Nearness::moment, {.maximum = 1e30},
               "greatest sum of squared distances to the planes of the triangles around, weighted by "
-              "their areas, that the collapse of an edge may cost, in voxels^4: beside a larger tolerance "
+              "their areas, that the collapse of an edge may cost, in voxels^4: with a larger tolerance "
               "it gives triangles to where they lower the root mean square distance most; 0 for as few as "
               "the tolerance allows")
           .choice("relaxation", &Nearness::relaxation, {{"0", 0}, {"1", 1}, {"3", 3}, {"6", 6}},

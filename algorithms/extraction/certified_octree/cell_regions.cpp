@@ -168,7 +168,7 @@ std::uint64_t RegionProposals::propose(std::int32_t block, int level, std::uint6
 void RegionProposals::read(std::int32_t block) {
   if (std::exchange(block_, block) == block) return;
   const auto& neighbours = cells_.source(block).neighbours;
-  // In most blocks all cells are free, because there is no special cell near.
+  // Most blocks have no special cell nearby, so all their cells are free.
   free_.fill(~std::uint64_t{0});
   if (std::ranges::any_of(neighbours,
                           [&](std::int32_t there) { return there >= 0 && any(cells_[there].special); })) {

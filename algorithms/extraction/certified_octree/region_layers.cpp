@@ -353,7 +353,7 @@ bool RegionLayers::holds(const Region& cube) const {
 }
 
 /// Returns true if sample `to` is inside, by the crossings on the path from `from`, a sample of the block.
-/// `to` may lie where there is no block.
+/// `to` may be outside all blocks.
 bool RegionLayers::is_inside(std::int32_t block, std::array<int, 3> from,
                              const std::array<int, 3>& to) const {
   bool inside = test(cells_.source(block).inside, sample_index(from[0], from[1], from[2]));

@@ -31,7 +31,7 @@ class TriangleReach {
   /// Returns the distances of p beyond the three sides, along the plane: negative inside.
   Eigen::Vector3d beyond(const Eigen::Vector3d& p) const { return sides_ * p - offsets_; }
 
-  /// Returns true if p is no farther than `within` from the triangle.
+  /// Returns true if the distance from p to the triangle is at most `within`.
   bool near(const Eigen::Vector3d& p, double within) const {
     const double height = normal_.dot(p - corners_[0]);
     if (std::abs(height) > within) return false;

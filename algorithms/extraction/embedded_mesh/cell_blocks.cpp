@@ -194,7 +194,7 @@ BlockMask CellBlocks::cells_with_cuts(std::int32_t b) const {
 }
 
 // From the signs of the first corners and the crossed edges that are not cuts, so that the signs of no other
-// block are needed, and upper samples may lie where there is no block.
+// block are needed, and upper samples may be outside all blocks.
 std::array<BlockMask, 8> CellBlocks::corner_signs(std::int32_t b) const {
   const HermiteView::Block& block = source_[b];
   const auto crossed = [&](int axis, int dx, int dy, int dz) {

@@ -139,7 +139,7 @@ class Orphans(unittest.TestCase):
                 ("`-o tolerance=0.1`, [x](page-2.md), <!--=a-->5.1 to 7<!--/-->, x86-64, C++20, Debian 12", []),
                 ("tables 9.1 to 9.4, (figures 9.15 and 9.16), §5.2, Chapter 6, in 2011", []),
                 ("table 9.2 has 12 rows", [(1, "12")]), ("```\n12\n```\n13", [(4, "13")]),
-                ("<!-- 4 --> -5 m-6", [(1, "5")]), ("Debian\n12", [(2, "12")])):
+                ("<!-- 4 --> -5 m-6", [(1, "5")]), ("on Debian\n12 and 13", [(2, "13")])):
             self.assertEqual(pages.orphans(text, ["Debian 12"]), expected)
 
 
