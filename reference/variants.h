@@ -1,4 +1,4 @@
-// The table of other people's methods, behind the same structs as ours, and of the slow certain oracles.
+// Tables of third-party methods, with the same interface as ours, and of slow, exact reference methods.
 #pragma once
 
 #include <span>
@@ -7,9 +7,9 @@
 
 namespace hermesh {
 
-/// The table of extractors of other people.
+/// Returns the table of third-party extractors.
 std::span<const Extractor> reference_extractors();
-/// The table of voxelizers of other people, and of the slow certain ones.
+/// Returns the table of third-party voxelizers and of the slow, exact ones.
 std::span<const Voxelizer> reference_voxelizers();
 
 }  // namespace hermesh

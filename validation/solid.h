@@ -1,4 +1,4 @@
-// Which solid the polygons of a mesh bound: tests if a point is inside.
+// The solid bounded by the polygons of a mesh: tests whether a point is inside.
 #pragma once
 
 #include <cstdint>
@@ -13,13 +13,13 @@
 namespace hermesh::validation {
 
 /// Counts the components of a closed, oriented mesh that have negative volume and are not within a component
-/// that faces outwards, so that they are not cavities. Fills `inside_out_components` and `inside_out_places`;
-/// leaves them unchanged if the report's mesh is not closed or not oriented. @throws Cancelled.
+/// that faces outwards, i.e. are not cavities. Fills `inside_out_components` and `inside_out_places`; leaves
+/// them unchanged if the report's mesh is not closed or not oriented. @throws Cancelled.
 void count_inside_out(const TriangleSoup& soup, const TriangleTree& tree, MeshReport& report,
                       const RunContext& context);
 
-/// A coarse grid of the space about a mesh: cubes of 1/128 of the longest side of the mesh's box, flooded
-/// from outside through the cubes that no triangle meets (tested by the boxes of the triangle's parts).
+/// A coarse grid of the space around a mesh: cubes of 1/128 of the longest side of the mesh's box, flooded
+/// from outside through the cubes that no triangle intersects (tested by the boxes of the triangle's parts).
 class FreeCells {
  public:
   /// A grid without cells, for which every point is neither free nor enclosed.
@@ -28,7 +28,7 @@ class FreeCells {
 
   /// Returns the side of a cube, world units.
   double cell() const { return cell_; }
-  /// Returns true if the flood reached the point's cube. Points beyond the box are free.
+  /// Returns true if the flood reached the point's cube. Points outside the box are free.
   bool free(const Eigen::Vector3d& point) const { return state_at(point) == kFree; }
   /// Returns true if neither the flood nor a triangle reaches the point's cube, so that triangles separate
   /// the point from infinity except for gaps narrower than a cube or two.
@@ -55,37 +55,35 @@ class FreeCells {
 
 enum class Side { outside, inside, unknown };
 
-/// The solid of any polygons. Points are classified by counting the polygons that rays cross, signed by the
-/// side that they come from, with exact predicates; a ray that meets an edge is replaced by another one. The
-/// count of a closed surface is its winding number for any ray; that of an open one is estimated by the mean
-/// over all rays (Jacobson, Kavan and Sorkine-Hornung, Robust Inside-Outside Segmentation using Generalized
-/// Winding Numbers, 2013).
+/// The solid bounded by arbitrary polygons. Points are classified by counting the polygons that rays
+/// intersect, signed by the side from which the ray arrives, with exact predicates; a ray that intersects an
+/// edge is replaced by another one. For a closed surface the count is the winding number, whichever the ray;
+/// for an open one the winding number is estimated by the mean over all rays (Jacobson, Kavan and
+/// Sorkine-Hornung, Robust Inside-Outside Segmentation using Generalized Winding Numbers, 2013).
 ///
 /// The output of a mesher is read `by_orientation`: inside is where its winding number is positive. The
-/// polygons of a soup may have any orientation, overlap and enclose voids, and its meaning is ambiguous:
-/// winding numbers keep a void that a flood from infinity fills. Read `by_any_rule`, a point is inside or
-/// outside only where these rules agree, with equal points of the polygons merged:
-///  - closed and balanced, every edge as often in one direction as in the other: inside if the winding number
-///  is
-///    positive or odd; outside if it is 0 or even and negative, and the point is reachable;
-///  - closed, an even number of sides at every edge: inside if a ray crosses an odd number of polygons;
-///  outside
-///    if an even one, and the point is reachable;
-///  - open, but neighbours are consistently oriented over all edges with two sides except 1 %: inside if of
-///  24
-///    rays 3/4 count over 0, or if they count 3/8 on average and a straight path leads to a cell that the
-///    flood does not reach (so the point is next to an inner wall without a second side); outside if 3/4 do
-///    not count over 0, 3/4 cross an even number, and the point is reachable;
-///  - open otherwise: inside if 3/4 cross an odd number; outside if 3/4 an even one, and the point is
-///  reachable.
+/// polygons of a soup may have any orientation, overlap and enclose voids, so its solid is ambiguous: winding
+/// numbers preserve a void that a flood from infinity fills. Read `by_any_rule`, a point is inside or outside
+/// only where these rules agree, with equal points of the polygons merged:
+///  - closed and balanced, i.e. every edge occurs equally often in both directions: inside if the winding
+///    number is positive or odd; outside if it is 0 or even and negative, and the point is reachable;
+///  - closed, i.e. an even number of sides at every edge: inside if a ray intersects an odd number of
+///    polygons; outside if it intersects an even number, and the point is reachable;
+///  - open, but neighbours are consistently oriented across all but 1 % of the edges with two sides: inside
+///    if the counts of at least 3/4 of 24 rays are positive, or if they average at least 3/8 and a segment
+///    leads to a cell that the flood does not reach (so the point is next to an inner wall without a second
+///    side); outside if at least 3/4 of the counts are not positive, 3/4 of the rays intersect an even
+///    number, and the point is reachable;
+///  - open otherwise: inside if 3/4 of the rays intersect an odd number; outside if 3/4 intersect an even
+///    number, and the point is reachable.
 /// Any other point is unknown. An oriented mesh whose volume is negative about every point of its box is
-/// turned as a whole first. A point is *reachable* if a straight path that crosses nothing leads from it to a
-/// cell that the flood from infinity reaches (FreeCells).
+/// first reversed as a whole. A point is *reachable* if a segment that intersects no polygon leads from it to
+/// a cell that the flood from infinity reaches (FreeCells).
 class Solid {
  public:
   enum class Reading { by_orientation, by_any_rule };
 
-  /// The solid of a soup of welded_triangles(), with the tree of that soup; keeps references to both.
+  /// Builds the solid of a soup of welded_triangles() with the tree of that soup; keeps references to both.
   /// @throws Cancelled.
   Solid(const TriangleSoup& welded, const TriangleTree& tree, Reading reading, const RunContext& context);
 
@@ -94,12 +92,12 @@ class Solid {
 
   /// Returns true if every edge has an even number of sides.
   bool closed() const { return closed_; }
-  /// Returns true if neighbours are consistently oriented over all edges but 1 %.
+  /// Returns true if neighbours are consistently oriented across all but 1 % of the edges.
   bool oriented() const { return oriented_; }
 
  private:
   struct Crossings {
-    int sum = 0;    ///< crossings in which the ray leaves through a front less those in which it enters
+    int sum = 0;    ///< number of exits through a front side minus number of entries
     int count = 0;  ///< number of all crossings
     bool sure = true;
   };

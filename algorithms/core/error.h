@@ -19,7 +19,7 @@ class Cancelled : public std::exception {
   const char* what() const noexcept override { return "cancelled"; }
 };
 
-/// Runs `work`; an Error of it that does not name `file` is rethrown with the name in front.
+/// Returns work(). An Error thrown by it that does not name `file` is rethrown with the name prepended.
 template <class Work>
 auto about_file(const std::string& file, Work&& work) {
   try {

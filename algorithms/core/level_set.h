@@ -31,8 +31,8 @@ class LevelSet {
   std::shared_ptr<const LevelSetGrid> grid_;
 };
 
-/// Returns the least and the greatest active value, tiles included; of a volume without active voxels the
-/// background twice.
+/// Returns the least and the greatest active value, tiles included; the background twice if the volume has no
+/// active voxels.
 std::pair<float, float> value_range(const LevelSet& volume);
 
 }  // namespace hermesh

@@ -20,7 +20,7 @@ inline LevelSet make_level_set(openvdb::FloatGrid::ConstPtr grid) {
 
 inline Eigen::Vector3d to_eigen(const openvdb::Vec3d& v) { return {v.x(), v.y(), v.z()}; }
 
-/// Registers OpenVDB's types, once; call it before a grid is made, read or written.
+/// Registers OpenVDB's types, once; call it before creating, reading or writing a grid.
 /// thesis/voxels/dense_hermite.h registers the types of dense Hermite data.
 void initialize_openvdb();
 

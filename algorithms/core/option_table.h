@@ -25,7 +25,7 @@ class OptionTable {
     double minimum = 0.0, maximum = 1e300;  ///< 1e300: no limit
   };
 
-  /// Declares a number, an integer if its member is one. `only_with` is that of OptionSpec.
+  /// Declares a number, which must be an integer if its member is one. `only_with` is that of OptionSpec.
   template <class Number>
   OptionTable&& number(const std::string& name, Number Settings::*member, Range range, std::string help,
                        std::vector<std::string> only_with = {}) && {
@@ -47,7 +47,7 @@ class OptionTable {
     return std::move(*this);
   }
 
-  /// Declares a choice among named values. @throws std::logic_error if the member's own value has no name.
+  /// Declares a choice among named values. @throws std::logic_error if the member's default has no name.
   template <class Value>
   OptionTable&& choice(const std::string& name, Value Settings::*member,
                        std::vector<std::pair<std::string, Value>> values, std::string help,
@@ -66,22 +66,22 @@ class OptionTable {
     return std::move(*this);
   }
 
-  /// Returns the declarations in their order, for the variant's entry in the table.
+  /// Returns the declarations in order, for the variant's entry in the table.
   std::vector<OptionSpec> specs() const {
     std::vector<OptionSpec> specs;
     for (const Entry& entry : entries_) specs.push_back(entry.spec);
     return specs;
   }
 
-  /// Returns the settings of checked options, which may contain others. @throws Error for a number that has
-  /// to be an integer; std::logic_error if one is missing.
+  /// Returns the settings that checked options specify; options of other tables are ignored. @throws Error
+  /// for a fraction where an integer is required; std::logic_error if an option is missing.
   Settings read(const Options& options) const {
     Settings settings{};
     for (const Entry& entry : entries_) entry.set(settings, options);
     return settings;
   }
 
-  /// Returns a table of all options except one, whose member has its default.
+  /// Returns a table of all options except one, whose member retains its default.
   OptionTable without(const std::string& name) const {
     OptionTable others = *this;
     std::erase_if(others.entries_, [&](const Entry& entry) { return entry.spec.name == name; });

@@ -12,7 +12,7 @@
 
 namespace hermesh {
 
-/// Reference to a function of the two ends of a range; the function must outlive it.
+/// Non-owning reference to a function f(begin, end), which must outlive it.
 class RangeFunction {
  public:
   template <class F>
@@ -27,13 +27,13 @@ class RangeFunction {
   void (*call_)(const void* function, std::size_t begin, std::size_t end);
 };
 
-/// Calls f(begin, end) in parallel for ranges of about `grain` numbers that together are 0…n−1, and checks
-/// for cancellation before each. (This header does without TBB's, which nearly every file would read, half a
-/// second each.) @throws Cancelled.
+/// Calls f(begin, end) in parallel for ranges of about `grain` indices that partition 0…n−1, and checks for
+/// cancellation before each. (This header does not include TBB's, which would add half a second to the
+/// compilation of nearly every file.) @throws Cancelled.
 void parallel_ranges(std::size_t n, const RunContext& context, const RangeFunction& f, std::size_t grain);
 
 /// Calls f(i) in parallel for i in 0…n−1, in tasks of at least `grain`, and checks for cancellation before
-/// each task. A block of samples takes microseconds, so that sixteen are worth a task. @throws Cancelled.
+/// each task. A block of samples takes microseconds, so sixteen of them are worth a task. @throws Cancelled.
 template <class F>
 void parallel_blocks(std::size_t n, const RunContext& context, F&& f, std::size_t grain = 16) {
   const auto range = [&f](std::size_t begin, std::size_t end) {

@@ -10,16 +10,16 @@
 
 namespace hermesh {
 
-/// Returns true if the fan about the first corner covers the polygon: each of its triangles has an area and
-/// faces as the polygon does, seen along its mean normal (Newell's: Tampieri 1992), as in every strictly
-/// convex polygon.
+/// Returns true if the fan about the first corner covers the polygon, i.e. each of its triangles has positive
+/// area and the polygon's orientation, seen along the mean normal (Newell's method, Tampieri 1992). This
+/// holds for every strictly convex polygon.
 bool is_fan(std::span<const Eigen::Vector3d> corners);
 
-/// Triangulates a polygon by ear clipping (Meisters 1975): n − 2 triangles, by the indices of their corners,
-/// cover it once, seen along its mean normal. Corners in a straight line, and a border that touches itself at
-/// points or runs there and back as a bridge to a hole, are allowed. Empty if no ear is found, e.g. where the
-/// border crosses itself. A polygon of a hundred thousand corners takes some tenths of a second. @throws
-/// Cancelled.
+/// Triangulates a polygon by ear clipping (Meisters 1975). Returns n − 2 triangles of corner indices that
+/// cover it once, seen along its mean normal. Collinear corners are allowed, and so is a boundary that
+/// touches itself at points or passes twice along a bridge to a hole. Returns an empty vector if no ear is
+/// found, e.g. because the boundary intersects itself. A polygon of a hundred thousand corners takes a few
+/// tenths of a second. @throws Cancelled.
 std::vector<Triangle> clip_ears(std::span<const Eigen::Vector3d> corners, const RunContext& context);
 
 }  // namespace hermesh

@@ -20,7 +20,7 @@ struct Promises {
   bool closed = false;                ///< no boundary edge
   bool manifold = false;              ///< no non-manifold edge or vertex
   bool oriented = false;              ///< no inconsistently oriented edge
-  bool no_self_intersection = false;  ///< no pair of polygons meets except along a shared corner or edge
+  bool no_self_intersection = false;  ///< polygons intersect only in shared corners and edges
 };
 
 struct AdaptivityField;  // extraction/adaptivity_field.h
@@ -35,14 +35,14 @@ struct ExtractionInput {
   const PolygonMesh* source = nullptr;  ///< the polygons that the volume was made from, or null
   const Options& options;
   RunContext& context;
-  /// Where an adaptive variant observes its error bound, and its behaviour elsewhere; null: everywhere.
-  /// Uniform variants ignore it.
+  /// The region in which an adaptive variant observes its error bound, and its behaviour elsewhere; null: the
+  /// bound holds everywhere. Uniform variants ignore it.
   const AdaptivityField* field = nullptr;
   /// Exact Hermite data of the surface at isovalue 0, on the level set's lattice and with its signs, instead
   /// of polygons; or null.
   const SparseHermite<EdgeCrossing>* hermite = nullptr;
-  /// True if the mesh is written to a file with world coordinates in single precision (STL), so that proofs
-  /// apply to the points as written.
+  /// True if the mesh is to be written to a file with world coordinates in single precision (STL); proofs
+  /// then apply to the vertices as written.
   bool written_in_single = false;
   /// The box of index coordinates that contains the vertices of variants without self-intersections
   /// (extraction/volume_ends.h). Up to rounding, all crossings lie in the box.

@@ -23,40 +23,41 @@ namespace hermesh {
 /// Result of one cutter.
 struct CutterRecord {
   enum class State {
-    cuts,      ///< some piece ends at it
-    takes,     ///< it holds whole parts of the object and its surface meets none
-    swallows,  ///< it holds all of the object
-    covered,   ///< the cutters before it took all that it holds
-    touches,   ///< it holds nothing of the object, but samples next to it
+    cuts,      ///< it bounds some piece
+    takes,     ///< it contains whole parts of the object, and its surface cuts none
+    swallows,  ///< it contains the whole object
+    covered,   ///< earlier cutters took everything that it contains
+    touches,   ///< it contains no sample of the object, but neighbours of such samples
     misses,
-    merged,  ///< its pieces were slivers, and neighbours have them
-    empty    ///< it holds no sample at all
+    merged,  ///< its pieces were slivers that were merged into neighbours
+    empty    ///< it contains no sample at all
   };
   std::string name;
   State state = State::misses;
   std::uint64_t samples = 0;  ///< the object's samples with the cutter's number as code; 0 for planes
   std::uint64_t edges = 0;    ///< lattice edges that the cutter cuts
 };
-/// The name of the enumerator.
+/// Returns the name of the enumerator.
 const char* to_string(CutterRecord::State state);
-/// The state as the rest of a sentence that begins with the cutter's name, such as "cuts the object".
+/// Returns the state as the predicate of a message that begins with the cutter's name, e.g. "cuts the
+/// object".
 const char* in_words(CutterRecord::State state);
 
 struct FractureOptions {
   DualContouringOptions placement;
   double tolerance = 0.0;            ///< voxels; above 0 the mesh is made coarser (joint_decimation.h)
-  bool split = true;                 ///< disconnected pieces become several
-  std::uint64_t least_samples = 27;  ///< merge smaller pieces into a neighbour; 27: a cube of 3³, 0: none
+  bool split = true;                 ///< split disconnected pieces
+  std::uint64_t least_samples = 27;  ///< merges smaller pieces into a neighbour; 27: a cube of 3³, 0: none
 };
 
-/// A sliver that was given to a neighbour: the codes of both, and the cutters' names for them.
+/// A sliver that was merged into a neighbour: the codes of both, and their names by the cutters.
 struct MergedPiece {
   CutCode code = 0, into_code = 0;
   std::string name, into_name;
   std::uint64_t samples = 0;
 };
 
-/// A solid in pieces, as labels and as one mesh of all.
+/// A fractured solid, with one mesh of all pieces.
 struct LabelledFracture {
   JointMesh mesh;
   std::unique_ptr<PieceTriangles> pieces;
@@ -65,8 +66,8 @@ struct LabelledFracture {
   std::vector<CutCode> codes;          ///< the cutters' code of each piece; [0] is unused
   std::vector<CutterRecord> cutters;
   std::vector<MergedPiece> merged;
-  std::uint64_t split_off = 0;   ///< pieces that are there because some fell apart
-  std::uint64_t small_kept = 0;  ///< pieces that stayed below the least number of samples
+  std::uint64_t split_off = 0;   ///< pieces added by splitting disconnected ones
+  std::uint64_t small_kept = 0;  ///< pieces that remain below the least number of samples
   RepairReport repair;
   /// Joints that were restricted to one sheet, because polygons at or next to them intersected others
   /// (LabelledSolid::one_sheet).
@@ -74,12 +75,12 @@ struct LabelledFracture {
   /// `cut_edges` counts the lattice edges between two pieces; at `made_up_crossings` of them no cutter's
   /// surface passes (LabelledGrid).
   std::uint64_t made_up_crossings = 0, cut_edges = 0;
-  /// Faces across which the object's mesh joins two pieces that have no seam there: those at which a gap is
-  /// left, and those at which the pieces touch in an edge.
+  /// Numbers of faces across which the object's mesh joins two pieces that have no seam there: faces with a
+  /// gap, and faces where the pieces touch in an edge.
   std::uint64_t gaps = 0, touches = 0;
   std::size_t grid_bytes = 0;  ///< memory of labels, codes and crossings
 
-  /// The pieces have the numbers 1 to piece_count().
+  /// Returns the number of pieces; they are numbered from 1.
   std::uint32_t piece_count() const { return pieces ? pieces->count() : 0; }
 };
 

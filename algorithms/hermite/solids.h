@@ -1,5 +1,5 @@
-// Booleans of polygonal solids: both on one lattice, as level sets for the signs and with their exact Hermite
-// data, which preserve the operands' creases and those where their surfaces meet.
+// Booleans of polygonal solids. Both operands are sampled on one lattice, as level sets for the signs and
+// with exact Hermite data, which preserve the operands' creases and those where their surfaces intersect.
 #pragma once
 
 #include <cstddef>
@@ -19,8 +19,8 @@ struct SharedLattice {
   Eigen::Vector3d origin = Eigen::Vector3d::Zero();
 };
 
-/// Returns the lattice of two meshes, about choose_origin() of their common box, so that their order does not
-/// matter, and near the zero of the world samples lie at multiples of the voxel size.
+/// Returns the lattice of two meshes. Its origin is choose_origin() of their common box, so it does not
+/// depend on their order, and near the world origin samples lie at multiples of the voxel size.
 SharedLattice shared_lattice(const PolygonMesh& a, const PolygonMesh& b, double voxel_size);
 
 struct SampledSolid {
@@ -32,9 +32,9 @@ struct SampledSolid {
 /// Samples polygons at multiples of the voxel size from the mesh's origin.
 using SampleMesh = std::function<SampledSolid(const PolygonMesh&)>;
 
-/// Samples a mesh unchanged near the lattice's origin, and elsewhere relative to a sample nearby, so that
-/// single precision loses at most 2⁻¹³ voxels.
-/// @throws Error for a mesh of more than 2³⁰ voxels' distance; if the level set has no sample inside.
+/// Samples a mesh unchanged if it is near the lattice's origin, and otherwise relative to a nearby sample, so
+/// that single precision loses at most 2⁻¹³ voxels.
+/// @throws Error if the mesh is more than 2³⁰ voxels away, or if the level set has no sample inside.
 SampledSolid sample_solid(const PolygonMesh& mesh, const SharedLattice& lattice, const SampleMesh& sample);
 
 /// Returns a note on the crossing edges of a solid that hit no polygon; empty if all hit one.
@@ -51,12 +51,12 @@ struct CombinedSolid {
 /// operand comes first. @throws Error as combine() of the Hermite data does.
 CombinedSolid combine(Boolean boolean, const SampledSolid& a, const SampledSolid& b, RunContext& context);
 
-/// Loss of a combination between samples (trap T10, boolean_rule.h): parts of edges that both operands cross
-/// in opposite directions, between the two crossings: of an intersection or a difference slivers of material
-/// that are lost, of a union gaps that are filled. No sample lies in them.
+/// Loss of a combination between samples (trap T10, boolean_rule.h). If the operands cross an edge in
+/// opposite directions, the part between the two crossings contains no sample: an intersection or a
+/// difference loses it, a sliver of material, and a union fills it, a gap.
 struct LostSlivers {
   std::size_t edges = 0;  ///< number of edges with such a part
-  double volume = 0.0;    ///< estimate in cubic voxels, by the lattice lines of the axis with the largest sum
+  double volume = 0.0;    ///< estimate in voxels³, from the lattice lines of the axis with the largest sum
   double longest =
       0.0;  ///< length of the longest part, voxels: the thickness there if the edge is perpendicular
   Eigen::Vector3d place = Eigen::Vector3d::Zero();  ///< middle of the longest part, world units
@@ -66,7 +66,7 @@ struct LostSlivers {
 /// voxel count as rounding. Symmetric in the operands of a union and an intersection.
 LostSlivers lost_slivers(Boolean boolean, const FloatHermite& a, const FloatHermite& b);
 
-/// Returns a note on the parts of the result that are thinner than a voxel of that size (world units). (Parts
+/// Returns a note on parts of the result that are thinner than a voxel (`voxel_size` in world units). (Parts
 /// that an operand lost by itself are reported when it is voxelized.)
 std::string lost_slivers_note(const LostSlivers& lost, Boolean boolean, double voxel_size);
 

@@ -1,5 +1,5 @@
-// The lattice of an existing volume, for another volume to share. Heavy (OpenVDB): include it from .cpp
-// files.
+// The lattice of an existing volume, so that other volumes can share it. Heavy (OpenVDB): include it from
+// .cpp files.
 #pragma once
 
 #include <Eigen/Core>

@@ -1,5 +1,5 @@
-// A sparse set of 8³ blocks of voxels, numbered, whose memory grows with the blocks and not with the space
-// around them.
+// A sparse, numbered set of 8³ blocks of voxels. Its memory is proportional to the number of blocks, not to
+// the volume of their bounding box.
 #pragma once
 
 #include <array>
@@ -106,8 +106,8 @@ class BlockTable {
   }
   /// Returns the coordinates of all blocks, by number.
   std::vector<BlockAt> blocks() const;
-  /// Returns the number in this table of each tile of `part`, a set that the table was made from, by its
-  /// number there.
+  /// Returns the number in this table of each tile of `part`, by its number in `part`. The table must have
+  /// been built from `part`.
   std::vector<std::uint32_t> translation(const BlockSet& part) const;
   /// Returns the number of the block for which insert() returned `code`; `translation` is that of its set.
   std::uint32_t number(const std::vector<std::uint32_t>& translation, std::uint32_t code) const {

@@ -11,8 +11,8 @@ struct TrianglePoint {
   Eigen::Vector3d weights;  ///< barycentric coordinates: at least 0, their sum is 1
 };
 
-/// Returns the point of the triangle a b c that is nearest to p; of a degenerate triangle that of its
-/// segments, or its only point. Any unit, the same for all.
+/// Returns the point of the triangle abc that is nearest to p. A degenerate triangle is treated as its edges,
+/// or as a single point. Any unit, the same for all arguments.
 TrianglePoint closest_point(const Eigen::Vector3d& p, const Eigen::Vector3d& a, const Eigen::Vector3d& b,
                             const Eigen::Vector3d& c);
 

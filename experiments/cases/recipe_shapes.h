@@ -32,7 +32,7 @@ class Random {
 class GradientNoise {
  public:
   explicit GradientNoise(std::uint64_t seed) : seed_(seed * 0x9e3779b97f4a7c15u) {}
-  /// Returns a value between about −1 and 1, and 0 if all coordinates are whole numbers.
+  /// Returns a value between about −1 and 1; 0 if all coordinates are integers.
   double operator()(const Eigen::Vector3d& point) const;
 
  private:
@@ -40,7 +40,7 @@ class GradientNoise {
   std::uint64_t seed_;
 };
 
-/// Returns cosine and sine of an angle in turns.
+/// Returns the cosine and the sine of an angle in turns.
 std::pair<double, double> on_circle(double turns);
 
 inline void add_point(PolygonMesh& mesh, const Eigen::Vector3d& point) {
@@ -54,18 +54,19 @@ inline std::uint32_t next_index(const PolygonMesh& mesh) {
 /// Adds the triangles abc and acd.
 void add_quad(PolygonMesh& mesh, std::uint32_t a, std::uint32_t b, std::uint32_t c, std::uint32_t d);
 
-/// Adds the triangles over the points: point 0, then rings of `around` points each, counter-clockwise seen
-/// from the last point, then that point.
+/// Adds triangles that connect the mesh's vertices: vertex 0, then rings of `around` vertices each,
+/// counter-clockwise seen from the last vertex, then that vertex.
 void connect_rings(PolygonMesh& mesh, std::uint32_t around);
 
-/// Returns the unit sphere with 8 n² triangles of about the same area.
+/// Returns the unit sphere as 8 n² triangles of about the same area.
 PolygonMesh octahedral_sphere(std::uint32_t n);
 
 /// Adds a sphere; one that faces inwards bounds a cavity.
 void add_sphere(PolygonMesh& mesh, const PolygonMesh& unit_sphere, double radius,
                 const Eigen::Vector3d& centre, bool inwards);
 
-/// Turns the point about x, then y, then z, by the parameters about_x, about_y and about_z in degrees.
+/// Returns the point rotated about x, then y, then z, by the parameters about_x, about_y and about_z in
+/// degrees.
 Eigen::Vector3d turned(const Eigen::Vector3d& point, const RecipeParameters& parameters);
 
 PolygonMesh torus(const RecipeParameters& parameters, RunContext& context);

@@ -13,14 +13,15 @@ struct BatchItem {
   std::string input, output;
 };
 
-/// Returns the name of the output of an input: `pattern` with {stem}, the input's name without its ending,
-/// {name}, the whole name, and {number}, the index from 1 with as many digits as `count`.
+/// Returns the name of the output of an input: `pattern`, in which {stem} is replaced by the input's name
+/// without its extension, {name} by the whole name, and {number} by the index from 1 with as many digits as
+/// `count`.
 /// @throws UsageError for other words in braces, or an invalid name.
 std::string output_name(const std::string& pattern, const std::string& input, std::size_t number,
                         std::size_t count);
 
-/// Returns the inputs with their outputs. @throws UsageError if two outputs have one name or an input would
-/// be overwritten.
+/// Returns the inputs with their outputs. @throws UsageError if two outputs have the same name or an input
+/// would be overwritten.
 std::vector<BatchItem> batch_items(const std::vector<std::string>& inputs, const std::string& directory,
                                    const std::string& pattern);
 

@@ -1,4 +1,4 @@
-// Pictures of meshes from one camera, shaded, with a wireframe close-up. Rays by Embree, drawing by Cairo.
+// Shaded pictures of meshes from one camera, with wireframe close-ups. Embree traces the rays, Cairo draws.
 #pragma once
 
 #include <array>
@@ -18,7 +18,7 @@ struct Viewpoint {
   double elevation = 20.0;  ///< above the horizon
 };
 
-/// The square of the close-up.
+/// The square region that the close-up shows.
 struct CloseUp {
   std::array<double, 3> centre{0.5, 0.5, 0.5};  ///< along x, y and z of the box, 0 to 1
   double size = 0.12;  ///< side of the square, as a fraction of the box's longest side

@@ -5,31 +5,33 @@
 
 namespace hermesh::validation::test {
 
-/// The unit cube [0,1]³ scaled and moved, as six quads or as twelve triangles, oriented outwards. Corner
-/// (x,y,z) of the unit cube is point x + 2y + 4z; the polygons come in the order −x +x −y +y −z +z.
+/// Returns the unit cube [0,1]³ scaled and translated, as six quads or as twelve triangles, oriented
+/// outwards. Corner (x,y,z) of the unit cube is vertex x + 2y + 4z; the polygons are in the order −x +x −y +y
+/// −z +z.
 MeshFile cube_of_quads(const Eigen::Vector3d& lower = Eigen::Vector3d::Zero(), double side = 1.0);
 MeshFile cube_of_triangles(const Eigen::Vector3d& lower = Eigen::Vector3d::Zero(), double side = 1.0);
 
-/// A torus of quads with the radii 1 and 0.25.
+/// Returns a torus of around × across quads with the radii 1 and 0.25.
 MeshFile torus(int around, int across);
 
-/// A prism over a regular polygon of `sides` corners on the unit circle, from z = 0 to 2: quads round about,
-/// fans of triangles at both ends.
+/// Returns a prism over a regular polygon of `sides` corners on the unit circle, from z = 0 to 2: quads on
+/// the sides, triangle fans at both ends.
 MeshFile prism(int sides);
 
-/// A profile, counter-clockwise and convex, swept from z = 0 to `depth`, in quads, with fans at both ends.
+/// Returns a counter-clockwise convex profile extruded from z = 0 to `depth`: quads on the sides, triangle
+/// fans at both ends.
 MeshFile extrusion(const std::vector<Eigen::Vector2d>& profile, double depth);
 
 /// Returns the mesh with all polygons reversed.
 MeshFile reversed(MeshFile mesh);
 
-/// Two meshes as one, each with points of its own.
+/// Returns both meshes as one, without shared vertices.
 MeshFile together(MeshFile a, const MeshFile& b);
 
-/// The mesh with equal points made one.
+/// Returns the mesh with vertices at equal positions merged.
 MeshFile welded(const MeshFile& mesh);
 
-/// The mesh as triangles, quads cut into abc and acd, each with three points of its own.
+/// Returns the mesh as triangles, each with three vertices of its own; a quad abcd is split into abc and acd.
 MeshFile soup_of_triangles(const MeshFile& mesh);
 
 }  // namespace hermesh::validation::test

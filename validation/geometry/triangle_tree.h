@@ -29,7 +29,7 @@ class TriangleTree {
   explicit TriangleTree(const TriangleSoup& soup);
 
   ClosestHit closest(const Eigen::Vector3d& point) const { return closest(point, slot_hit(point, 0)); }
-  /// Returns the closest point; a first guess, such as the slot found for a nearby point, speeds up the
+  /// Returns the closest point. An initial guess, such as the slot found for a nearby point, speeds up the
   /// search.
   ClosestHit closest(const Eigen::Vector3d& point, std::uint32_t guess) const {
     return closest(point, slot_hit(point, guess));
@@ -54,8 +54,8 @@ class TriangleTree {
                     });
   }
 
-  /// Calls visit(slot) for each triangle whose box the segment meets, and for some others, until visit()
-  /// returns false. Returns true if it never did.
+  /// Calls visit(slot) for each triangle whose box the segment intersects, and possibly for others, until
+  /// visit() returns false. Returns true if it never did.
   template <class Visit>
   bool for_each_on_segment(const Eigen::Vector3d& from, const Eigen::Vector3d& to, const Visit& visit) const {
     const Slabs slabs(from, to);
@@ -110,7 +110,7 @@ class TriangleTree {
     return true;
   }
 
-  // The intervals of a segment's parameter between the planes of boxes, slightly enlarged to cover rounding.
+  // The slab test of a segment against boxes, with parameter intervals slightly enlarged to cover rounding.
   struct Slabs {
     Eigen::Vector3d from, inverse;
     Slabs(const Eigen::Vector3d& start, const Eigen::Vector3d& end)

@@ -1,11 +1,12 @@
-// A coarse mesh whose distance from a fine one is proved.
+// Decimation of a fine mesh with a proved bound of the distance.
 //
-// *Propose* (merge_proposals.h): sets of vertices become one, the minimiser of the squared distances to the
-// planes of all triangles that they represent (quadrics, Garland & Heckbert 1997): first those of blocks of
-// up to 16 voxels, then the ends of edges, cheapest first. *Prove*: the resulting mesh (merge_proof.h).
-// Merges that cannot be proved are undone, set by set, down to single vertices if necessary; so this ends, at
-// worst with the fine mesh. Bold collapses, which look only at the quadrics and stay well below the
-// tolerance, do much of the work in a small part of the time; careful ones follow, and again around the sets
+// *Propose* (merge_proposals.h): sets of vertices are merged into one vertex, the minimiser of the squared
+// distances to the planes of all triangles that they represent (quadrics, Garland & Heckbert 1997): first the
+// vertices of blocks of up to 16 voxels, then the ends of edges, cheapest first. *Prove* (merge_proof.h): the
+// resulting mesh is checked. Merges that cannot be proved are undone, set by set, down to single vertices if
+// necessary, so the algorithm terminates, at worst with the fine mesh. Unverified collapses
+// (Collapses::bold), which evaluate only the quadrics and stay well below the tolerance, do much of the work
+// in a small part of the time; verified ones (Collapses::careful) follow, and are repeated around the sets
 // that the proof has split.
 #pragma once
 
@@ -21,7 +22,7 @@
 
 namespace hermesh {
 
-/// A coarse mesh, with the fine triangle that each of its triangles represents.
+/// A coarse mesh, with the fine triangle that each of its triangles originates from.
 struct CertifiedMesh {
   std::vector<Eigen::Vector3d> points;  ///< FilePoints::rounded()
   std::vector<Triangle> triangles;
@@ -29,7 +30,7 @@ struct CertifiedMesh {
       fine_triangle;  ///< by triangle: the fine one whose corners were merged into its own
 };
 
-/// Settings that lower the root mean square distance, in addition to the bound of the largest one.
+/// Settings that lower the root mean square distance; the bound of the largest distance holds regardless.
 struct Nearness {
   double moment = 0;   ///< DecimationInput::moment; 0: as few triangles as the tolerance admits
   int relaxation = 0;  ///< sweeps of propose_relaxation(); 0: none
@@ -40,12 +41,12 @@ struct Nearness {
 /// triangle is the least of its corners. Every position on the fine mesh is within its triangle's tolerance
 /// and kDistanceSlack of the coarse mesh, and every position on the coarse mesh is within the tolerance of
 /// some fine triangle and that slack; where tolerances differ, this need not be the nearest triangle. The
-/// same bytes for any number of threads.
+/// result is identical for any number of threads.
 /// @param fine closed and oriented, or a complex of patches; index space
 /// @param tolerance by vertex of `fine`, voxels. Vertices with tolerance 0 do not move, and none is merged
 ///   into another; others may be merged into them.
-/// @param pinned by vertex of `fine`, or empty: further vertices that stay. The ends of edges with more than
-///   two triangles must be pinned, so a complex of patches keeps their boundaries.
+/// @param pinned by vertex of `fine`, or empty: further vertices that stay fixed. The ends of edges with more
+///   than two triangles must be pinned, which preserves the boundaries of a complex's patches.
 /// @param file rounds positions to the file's precision
 /// @param pieces of each triangle of a complex (shell_volumes.h); empty for a closed mesh
 /// @throws Cancelled

@@ -1,5 +1,5 @@
 // The mesh whose edges collapse, its part in one domain of a round, and one collapse there
-// (collapse_edges()). All lengths in voxels, index space.
+// (collapse_edges()). All lengths are in voxels, positions in index space.
 #pragma once
 
 #include <algorithm>
@@ -26,8 +26,8 @@ struct DecimatedMesh {
   std::vector<float> least_tolerance;   ///< least among the samples that the vertex represents
   std::vector<std::uint8_t> unmoved;    ///< 1 for samples that are vertices in their original position
   // By triangle, except `next_sample`:
-  std::vector<Triangle> triangles;           ///< first corner FineMesh::kNone: removed
-  std::vector<std::uint32_t> fine_triangle;  ///< triangle of the fine mesh that each began as
+  std::vector<Triangle> triangles;           ///< removed if the first corner is kNone
+  std::vector<std::uint32_t> fine_triangle;  ///< triangle of the fine mesh that each originates from
   std::vector<std::uint32_t> first_sample;   ///< head of the list of samples attached to each, or kNone
   std::vector<std::uint32_t> next_sample;    ///< by sample: the next one of the same list, or kNone
   /// By sample, 1 if edges at the vertex are tested in this round, and in the next. An edge that failed fails
@@ -52,7 +52,7 @@ struct Domain {
   Eigen::Vector3d start;
   double side;
   Index index;
-  double longest_edge;  ///< longest that a collapse may make, so that the domains of a round coarsen evenly
+  double longest_edge;  ///< longest that a collapse may create, so that all domains coarsen evenly
   bool holds(const Eigen::Vector3d& p) const { return index_of(p, start, side) == index; }
 };
 
@@ -88,8 +88,8 @@ struct DomainMesh {
     for (std::uint32_t corner = vertices[v].first_corner; corner != kNone; corner = next_corner[corner])
       if (!faces[corner / 3].gone) f(corner / 3, static_cast<int>(corner % 3));
   }
-  /// Gives `staying` the remaining corners of `going`, without those of removed faces, which would make the
-  /// walk around it ever longer.
+  /// Merges the corner list of `going` into that of `staying`, without corners of removed faces, which would
+  /// make the list ever longer.
   void merge_corners(std::uint32_t going, std::uint32_t staying);
 
   std::vector<Vertex> vertices;
@@ -113,19 +113,20 @@ struct Collapse {
 
   std::uint32_t v, going;
   Eigen::Vector3d x;
-  bool v_moves;                    ///< otherwise x is at v, and its faces stay unless they contain `going`
+  bool v_moves;                    ///< otherwise x is at v, whose faces stay unless they contain `going`
   std::vector<std::uint32_t> old;  ///< faces that are removed or changed
   std::vector<NewFace> made;       ///< resulting faces
   std::vector<Attached> attached;  ///< samples of the old faces, and those of the vertices that move
 };
 
-/// The distance test of careful collapses. It reads the current collapse, and writes Collapse::attached.
+/// The distance test of verified collapses (Collapses::careful). It reads the current collapse, and writes
+/// Collapse::attached.
 class CollapseDistance {
  public:
   CollapseDistance(DecimatedMesh& mesh, DomainMesh& domain, Collapse& collapse)
       : mesh_(mesh), domain_(domain), collapse_(collapse) {}
 
-  /// Returns true if every sample of the old triangles, and each end that moves, has a new triangle within
+  /// Returns true if every sample of the old triangles, and each vertex that moves, has a new triangle within
   /// its tolerance, and the new vertex and the new edges are within the tolerance of the fine mesh.
   bool passes();
 
@@ -154,8 +155,8 @@ struct Join {
 
 /// Collapses edges in a domain, and returns the joins in order. `triangles` are those whose boxes touch the
 /// domain, ascending; `local` is as for DomainMesh. Changes only triangles with all corners in the domain,
-/// the vertices in it and the samples attached to them; of all other triangles it reads only that they do not
-/// qualify. So different threads may process different domains of a round concurrently. @throws Cancelled
+/// the vertices in it and the samples attached to them; of any other triangle it reads only enough to exclude
+/// it. So threads may process different domains of a round concurrently. @throws Cancelled
 std::vector<Join> collapse_in_domain(DecimatedMesh& mesh, Collapses kind, const Domain& domain,
                                      std::span<const std::uint32_t> triangles,
                                      std::vector<std::uint32_t>& local, const RunContext& context);

@@ -21,12 +21,13 @@ namespace hermesh {
 
 inline constexpr int kCubeLevels = 3;  ///< a cube of a level is 2^level cells wide
 
-/// Returns the cube of a level, from 1 on, that contains a cell. Cubes are numbered along z, y and x.
+/// Returns the index of the cube of a level ≥ 1 that contains a cell. Cubes are numbered along z, then y,
+/// then x.
 constexpr int cube_of(int cell, int level) {
   const int bits = kCubeLevels - level;
   return ((((cell >> 6) >> level) << bits | ((cell >> 3) & 7) >> level) << bits) | (cell & 7) >> level;
 }
-/// Returns the first cell of a cube: the one with the least coordinates.
+/// Returns the first cell of a cube, i.e. the one with the least coordinates.
 constexpr int first_cell(int cube, int level) {
   const int bits = kCubeLevels - level, mask = (1 << bits) - 1;
   return sample_index((cube >> (2 * bits)) << level, ((cube >> bits) & mask) << level,
@@ -41,8 +42,8 @@ constexpr std::uint64_t parts_of(int cube, int level) {
                  first + sample_index((i >> 2) * step, ((i >> 1) & 1) * step, (i & 1) * step), level - 1);
   return parts;
 }
-/// Returns the bits of a cube in each of its words of a mask, without its first rows along y and columns
-/// along z.
+/// Returns the bits of a cube in each word of a mask that it covers, without the first `skip_y` rows along y
+/// and `skip_z` columns along z.
 constexpr std::uint64_t rows_of(int first, int side, int skip_y, int skip_z) {
   const std::uint64_t row = (((std::uint64_t{1} << side) - 1) >> skip_z << skip_z) << (first & 7);
   std::uint64_t rows = 0;
@@ -50,8 +51,8 @@ constexpr std::uint64_t rows_of(int first, int side, int skip_y, int skip_z) {
   return rows;
 }
 
-/// Returns the cells of a block at most kSteps (up to 8) along each axis from a cell of a mask. `mask_at(ax,
-/// ay, az)`, each −1 to 1, returns a pointer to the mask of the block there, or null.
+/// Returns the cells of a block that are at most kSteps (up to 8) along each axis from a cell of a mask.
+/// `mask_at(ax, ay, az)`, each −1 to 1, returns a pointer to the mask of the block there, or null.
 template <int kSteps, class MaskAt>
 BlockMask widened(MaskAt&& mask_at) {
   constexpr int kSide = 8 + 2 * kSteps;
@@ -80,7 +81,7 @@ BlockMask widened(MaskAt&& mask_at) {
   return result;
 }
 
-/// Tolerances of cells in voxels, by CellBlocks::cell_number(), or one for all.
+/// Tolerances in voxels: one per cell, by CellBlocks::cell_number(), or the same for all.
 class CellTolerances {
  public:
   explicit CellTolerances(float all) : all_(all) {}
@@ -105,7 +106,7 @@ struct RegionOptions {
 
 /// The data that the cells of a cube share.
 struct ProposedCube {
-  Eigen::Vector3d place;   ///< of its vertex, rounded for the file
+  Eigen::Vector3d place;   ///< position of its vertex, rounded for the file
   Eigen::Vector3f normal;  ///< mean normal of its crossings, unit length
 };
 
@@ -124,10 +125,10 @@ class RegionProposals;
 /// The partition of the active cells into regions: at first all proposed cubes, which split() refines.
 ///
 /// A cube is proposed if the surface within it is a disc with a simple border, none of its cells is near a
-/// special one, and some position within it is near the planes of all its crossings, given the tolerance. The
-/// border is simple if each edge of the cube is crossed at most once, and the border passes each of its faces
-/// at most once, from edge to edge. (The thesis, §6.3 and §6.4, tests the signs of corners and midpoints, and
-/// merges small cubes into large ones.)
+/// special one (CellBlocks::Block::special), and some position within it is near the planes of all its
+/// crossings, as the tolerance requires. The border is simple if each edge of the cube is crossed at most
+/// once, and the border passes each of its faces at most once, from edge to edge. (The thesis, §6.3 and §6.4,
+/// tests the signs of corners and midpoints, and merges small cubes into large ones.)
 class CellRegions {
  public:
   static constexpr int kLevels = kCubeLevels;
@@ -162,7 +163,7 @@ class CellRegions {
     return options_.tolerance.least(cells_, region.block, region.cell, region.side());
   }
   std::size_t cube_count() const { return cubes_.size(); }
-  /// The vertex and normal of the cube with this number.
+  /// Returns the vertex and the normal of the cube with this number.
   const ProposedCube& cube(std::uint32_t number) const { return cubes_[number]; }
   /// Returns the number of a cube, from 0; it never changes.
   std::uint32_t number(const Region& cube) const {
@@ -176,10 +177,10 @@ class CellRegions {
   /// Splits a cube into single cells until the next propose_parts(). Safe to call for several blocks
   /// concurrently.
   void split(const Region& region);
-  /// Proposes cubes within those that were split. @throws Error for more than 2³² cubes; Cancelled
+  /// Proposes smaller cubes within those that were split. @throws Error for more than 2³² cubes; Cancelled
   void propose_parts(RunContext& context);
 
-  /// The cells of a block that belong to cubes, active or not.
+  /// Returns the cells of a block that belong to cubes, active or not.
   const BlockMask& merged(std::int32_t block) const { return blocks_[block].merged; }
   /// Returns the crossed edges of a block, by axis, with at least three regions around them, one of them a
   /// cube.

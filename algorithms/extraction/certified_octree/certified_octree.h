@@ -1,4 +1,4 @@
-// Adaptive contouring with the guarantees of `manifold-dual-contouring`, many times as fast and with more
+// Adaptive contouring with the guarantees of `manifold-dual-contouring`, many times faster but with more
 // polygons: cubes of 2³, 4³ and 8³ cells become one vertex each, as in an octree, and vertices stay within
 // their cells.
 #pragma once
@@ -20,9 +20,10 @@ struct CertifiedOctreeOptions {
       uniform;  ///< placement of the uniform mesh's vertices, whose `reach` is always treated as 0
 };
 
-/// Computes the uniform mesh within its cells (uniform_mesh.h), then merges cubes of cells that are proved to
-/// preserve the topology, the freedom from self-intersection and the bound (region_mesh.h). The result is
-/// identical for any number of threads. The field has the same meaning as for manifold_dual_contouring().
+/// Computes the uniform mesh within its cells (uniform_mesh.h), then merges cubes of cells where the result
+/// is proved to preserve the topology, to be free of self-intersection and to satisfy the bound
+/// (region_mesh.h). The result is identical for any number of threads. The field has the same meaning as for
+/// manifold_dual_contouring().
 PolygonMesh certified_octree(const HermiteView& grid, const CertifiedOctreeOptions& options,
                              const AdaptivityField* field, RunContext& context);
 

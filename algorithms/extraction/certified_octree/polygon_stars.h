@@ -1,4 +1,4 @@
-// Tests if the polygons around a vertex can intersect one another.
+// Tests whether the polygons around a vertex can intersect one another.
 #pragma once
 
 #include <Eigen/Core>
@@ -8,9 +8,9 @@
 namespace hermesh {
 
 /// A quick test for vertices whose polygons form a closed ring around them, as in a manifold. The *star* of a
-/// vertex consists of its triangles. It is *plain* if there is a direction from which all its triangles are
-/// seen with the same orientation, and surround the vertex once: then no two of them intersect except in
-/// their shared sides. Call ask() for the vertices to test, then add() for all their triangles, then
+/// vertex consists of its triangles. It is *plain* if there is a direction from which all its triangles
+/// appear counter-clockwise and surround the vertex exactly once; then no two of them intersect except in
+/// their shared edges. Call ask() for the vertices to test, then add() for all their triangles, then
 /// is_plain().
 class PolygonStars {
  public:
@@ -20,9 +20,8 @@ class PolygonStars {
   /// overlap calls of the other.
   void ask(std::uint32_t point);
   bool is_asked(std::uint32_t point) const { return asked_[point] != 0; }
-  /// Adds a triangle of a vertex and two others, given relative to the vertex: from the first to the second
-  /// it is counter-clockwise seen from the direction of `up`. All triangles of a vertex must have the same
-  /// `up`.
+  /// Adds a triangle of a vertex. Its other two corners are given relative to the vertex, in the order that
+  /// is counter-clockwise in a plain star seen from `up`. All triangles of a vertex must have the same `up`.
   void add(std::uint32_t point, const Eigen::Vector3d& up, const Eigen::Vector3d& to_first,
            const Eigen::Vector3d& to_second);
   /// Returns true if the star of a vertex is plain; false if its test was not requested.
@@ -32,7 +31,7 @@ class PolygonStars {
   static constexpr std::uint32_t kTurned = 1u << 31;
   std::vector<std::uint8_t> asked_;  ///< 1 for vertices to be tested
   std::vector<std::uint32_t>
-      marks_;  ///< for each vertex kTurned, and the number of triangles that intersect one ray from it
+      marks_;  ///< by vertex: number of triangles that intersect one ray, | kTurned if one is reversed
 };
 
 }  // namespace hermesh

@@ -1,4 +1,4 @@
-// Fast adaptive contouring: cubes of cells become one vertex each (`certified-octree`).
+// Fast adaptive contouring in which each merged cube of cells has one vertex (`certified-octree`).
 #pragma once
 
 #include <Eigen/Core>
@@ -21,11 +21,11 @@ struct RegionMesh {
   std::vector<std::uint8_t> of_cube;  ///< 1 for vertices that represent more than one cell
 };
 
-/// Merges cells by cubes. The mesh is closed, oriented, manifold and free of self-intersection if the uniform
-/// mesh is, and within the tolerance of it both ways (region_proof.h). The result is identical for any number
-/// of threads.
-/// @param uniform without any vertices yet
-/// @param in_hulls true if its vertices lie in the hull of their cells' crossings, as means do
+/// Merges cells into cubes. The mesh is closed, oriented, manifold and free of self-intersection if the
+/// uniform mesh is, and its two-sided distance to that mesh is within the tolerance (region_proof.h). The
+/// result is identical for any number of threads.
+/// @param uniform the uniform mesh, whose vertices must not have been computed yet
+/// @param in_hulls true if its vertices lie in the convex hulls of their cells' crossings, as means do
 /// @param options tolerance and sizes of cubes
 /// @param file rounds positions to the file's precision
 /// @param context receives the progress, the statistics and the request to cancel

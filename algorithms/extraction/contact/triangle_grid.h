@@ -1,4 +1,4 @@
-// A spatial index of triangles, to find those that may intersect a box.
+// A spatial index that finds the triangles that may intersect a box.
 #pragma once
 
 #include <Eigen/Core>
@@ -12,12 +12,12 @@
 
 namespace hermesh {
 
-/// Triangles by size and position: for each power of two, a lattice of cells, found by hashing, each with a
-/// list of the triangles that are about as wide as the cell. No triangle is in more than eight cells, however
-/// much their sizes differ.
+/// A hierarchical hash grid: one lattice of cells per power of two, stored in a hash table. Each triangle is
+/// listed in the cells that its box overlaps, on the level whose cells are about as wide as the triangle. So
+/// no triangle is in more than eight cells, however much the sizes of triangles differ.
 class TriangleGrid {
  public:
-  /// Sorts triangles into lattices. `boxes` are their bounding boxes, and must outlive this object.
+  /// Inserts the triangles. `boxes` are their bounding boxes, and must outlive this object.
   explicit TriangleGrid(const std::vector<Bounds>& boxes) : boxes_(boxes), level_(boxes.size()) {
     double widths = 0.0;
     for (const Bounds& box : boxes) widths += width(box);
@@ -36,9 +36,9 @@ class TriangleGrid {
 
   int level(std::uint32_t triangle) const { return level_[triangle]; }
 
-  /// Calls visit(other) for the triangles of level `from_level` or higher whose cells the triangle's box
-  /// overlaps: possibly several times for the same one, for triangles that do not overlap the box, and for
-  /// the triangle itself. Each level from the triangle's own upwards has at most eight such cells.
+  /// Calls visit(other) for the triangles of level `from_level` or higher that are listed in a cell that the
+  /// triangle's box overlaps. `other` may be visited several times, need not overlap the box, and may be the
+  /// triangle itself. Each level from the triangle's own upwards has at most eight such cells.
   template <class Visit>
   void visit(std::uint32_t triangle, int from_level, Visit&& visit) const {
     for (auto k = static_cast<std::size_t>(from_level); k < levels_.size(); ++k)

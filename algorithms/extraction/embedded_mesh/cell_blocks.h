@@ -1,11 +1,12 @@
 // The active cells of a lattice by block, with their sheets, vertices and edges.
 //
 // The lattice is that of Hermite data, or one whose inside is divided into several pieces
-// (algorithms/fracture/). In the latter, edges with both ends inside, but in different pieces, are crossed as
-// well; such an edge is a *cut*. A cell without a cut is as in Hermite data: the inside bits of its corners
-// determine its sheets. A cell with a cut is a junction cell, or *joint*. Most joints have one vertex, shared
-// by all their crossed edges, and no ambiguous face; the lattice specifies the sheets of the others. The
-// maker of such a lattice ensures that the pieces become manifold (fracture/label_repair.h).
+// (algorithms/fracture/). In the latter, edges whose ends are both inside, but in different pieces, also
+// count as crossed; such an edge is a *cut*. A cell without a cut is as in Hermite data: the inside bits of
+// its corners determine its sheets. A cell with a cut is a junction cell, or *joint*. Most joints have one
+// vertex, shared by all their crossed edges, and no ambiguous face; the lattice specifies the sheets of the
+// others. The code that creates such a lattice ensures that the pieces become manifold
+// (fracture/label_repair.h).
 #pragma once
 
 #include <Eigen/Core>
@@ -53,7 +54,7 @@ using SheetsOfBlock = std::vector<std::pair<std::uint16_t, CellSheets>>;
 class CellGrid {
  public:
   virtual ~CellGrid() = default;
-  /// The blocks, with the signs of all their samples.
+  /// Returns the blocks, with the signs of all their samples.
   virtual const HermiteView::Blocks& blocks() const = 0;
   virtual const IndexToWorld& placement() const = 0;
   /// Returns the crossing of a crossed edge; its offset is in voxels from the edge's first sample.
@@ -62,9 +63,10 @@ class CellGrid {
   virtual void crossings(std::int32_t block, EdgeCrossing* out) const {
     blocks()[block].for_each([&](int axis, int sample) { *out++ = crossing(block, sample, axis); });
   }
-  /// The crossed edges that are cuts, by block and axis; empty if the lattice has none.
+  /// Returns the crossed edges that are cuts, by block and axis; empty if the lattice has none.
   virtual std::span<const std::array<BlockMask, 3>> cuts() const { return {}; }
-  /// The joints of each block that have several sheets or an ambiguous face; empty if the lattice has none.
+  /// Returns the joints of each block that have several sheets or an ambiguous face; empty if the lattice has
+  /// none.
   virtual std::span<const SheetsOfBlock> joint_sheets() const { return {}; }
   /// Returns true if the two inside corners of an ambiguous face without a cut belong to one piece. If not,
   /// they are cut off one by one and never joined across the face.
@@ -99,7 +101,7 @@ class CellBlocks {
     bool operator==(const Cell&) const = default;
     auto operator<=>(const Cell&) const = default;
   };
-  /// The four cells around an edge, counter-clockwise for a viewer whom the edge's axis points at: the
+  /// The four cells around an edge, counter-clockwise seen from the positive end of the edge's axis: the
   /// corners of a quad that faces along the axis. If the edge's first sample is outside, the quad must be
   /// reversed.
   struct Around {
@@ -116,14 +118,14 @@ class CellBlocks {
   /// Cancelled
   CellBlocks(const CellGrid& grid, RunContext& context);
 
-  /// The distance in voxels of vertices from the faces of their cells, and of crossings from the ends of
-  /// their edges, so that rounding to the file's precision moves none across. The mean of a loop's crossings
-  /// may be as near to a face as a third of the margin, and rounding also moves a crossing off its edge. The
-  /// margin is therefore eight times the rounding at the lattice's farthest corner, and at least 1/1024:
-  /// along axes of the world, eight times the rounding at 2048 voxels from the meshes' origin
-  /// (IndexToWorld::origin).
+  /// Returns the least distance in voxels of vertices from the faces of their cells, and of crossings from
+  /// the ends of their edges, which ensures that rounding to the file's precision moves none across. The mean
+  /// of a loop's crossings may be as close to a face as a third of the margin, and rounding also moves a
+  /// crossing off its edge. The margin is therefore eight times the rounding at the lattice's farthest
+  /// corner, and at least 1/1024: along axes of the world, eight times the rounding at 2048 voxels from the
+  /// meshes' origin (IndexToWorld::origin).
   double margin() const { return margin_; }
-  /// The largest rounding error of a point in the file along each axis of the lattice, in voxels.
+  /// Returns the largest rounding error of a vertex in the file along each axis of the lattice, in voxels.
   const Eigen::Vector3d& rounding() const { return rounding_; }
 
   std::size_t size() const { return blocks_.size(); }
@@ -132,7 +134,7 @@ class CellBlocks {
   const HermiteView::Block& source(std::int32_t block) const { return source_[block]; }
   std::size_t point_count() const { return points_; }
   std::size_t cell_count() const { return codes_.size(); }
-  /// The number of an active cell, from 0, ascending by block and cell.
+  /// Returns the number of an active cell, from 0, ascending by block and cell.
   std::uint32_t cell_number(std::int32_t block, int cell) const {
     return blocks_[block].first_cell + rank_of(blocks_[block], cell);
   }
@@ -143,8 +145,8 @@ class CellBlocks {
 
   /// Returns the sheets of an active cell. They follow from the inside bits of its corners and the drawing of
   /// its ambiguous faces, except for joints listed in CellGrid::joint_sheets(). For any other joint they
-  /// follow from the inside bits only and ignore its cuts, so its segments are valid on faces without a cut
-  /// only. As its cell is simple (fracture/label_repair.h), it has one sheet (or none, if all corners are
+  /// follow from the inside bits only and ignore its cuts, so its segments are valid only on faces without a
+  /// cut. As its cell is simple (fracture/label_repair.h), it has one sheet (or none, if all corners are
   /// inside) and no ambiguous face, so none of its faces is explicit because of it.
   ///
   /// On an ambiguous face the corners of one sign are cut off and those of the other sign joined. The normals
@@ -160,8 +162,8 @@ class CellBlocks {
     return kCellSheets[codes_[cell_number(block, cell)]];
   }
   bool is_joint(std::int32_t block, int cell) const { return test(blocks_[block].joints, cell); }
-  /// Returns true if a face of an active cell is pinched, see sheets(). This remains possible for joints
-  /// only.
+  /// Returns true if a face of an active cell is pinched, see sheets(). This remains possible only for
+  /// joints.
   bool is_pinched(std::int32_t block, int cell, int face) const;
   /// Returns the number of vertices of an active cell: one per sheet, and one for a joint without given
   /// sheets.
@@ -256,7 +258,8 @@ class CellBlocks {
   /// Returns true if a face of the cell may be explicit, including uncrossed faces next to a cell of several
   /// sheets.
   bool has_explicit_face(std::int32_t block, int cell) const;
-  /// Compares edges by coordinates and axis: a strict order that does not depend on the numbering of blocks.
+  /// Returns true if edge a precedes b by coordinates and axis: a strict order independent of the numbering
+  /// of blocks.
   bool comes_first(const Edge& a, const Edge& b) const;
 
   template <class F>
@@ -294,8 +297,8 @@ class CellBlocks {
   const std::span<const SheetsOfBlock> given_;
   LargeArray<Block> blocks_;
   ByBlock<SheetsOfBlock> joined_sheets_;  ///< sheets of the cells that are `joined`
-  /// The cells with several sheets, ascending, with the number of further vertices of the block's cells
-  /// before.
+  /// The cells with several sheets, ascending, each with the number of further vertices of the block's cells
+  /// before it.
   ByBlock<std::vector<std::pair<std::uint16_t, std::uint16_t>>> several_;
   std::vector<std::uint8_t> codes_;  ///< signs of the corners of each active cell
   std::size_t points_ = 0;

@@ -1,5 +1,5 @@
 // Hermite data in OpenVDB trees of voxels (Aldén 2011, §4.2, §7.1 and figure 4.3): the thesis's layout, and
-// the memory that SparseHermite saves is measured against it.
+// the baseline of the memory that SparseHermite saves.
 //
 // Light: the trees themselves are in dense_tree.h.
 #pragma once
@@ -33,7 +33,7 @@ struct DenseHermite {
   std::shared_ptr<const DenseGrid<Voxel>> grid;
 
   std::size_t leaves() const;
-  std::size_t crossings() const;     ///< number of edges that are crossed according to their voxels
+  std::size_t crossings() const;     ///< number of edges that their voxels record as crossed
   std::size_t memory_bytes() const;  ///< bytes that the tree has allocated
   static std::size_t bytes_per_leaf();
 };
@@ -55,8 +55,8 @@ DenseHermite<Voxel> to_dense(const FloatHermite& hermite, RunContext& context,
 template <DenseVoxel Voxel>
 DenseHermite<Voxel> to_dense(const PackedHermite& hermite, RunContext& context);
 
-/// Converts to sparse data. An edge whose ends differ in sign, but that is not crossed according to its
-/// voxel, gets a crossing in the middle with the edge's direction as normal, towards the outside; `lost` is
+/// Converts to sparse data. An edge whose ends differ in sign, but whose voxel does not record a crossing,
+/// gets a crossing at its midpoint with the edge's direction as normal, towards the outside; `lost` is set to
 /// the number of these.
 /// @throws Error if signs change between two tiles, which only data of other programs can contain.
 template <DenseVoxel Voxel>
@@ -65,9 +65,9 @@ FloatHermite to_sparse(const DenseHermite<Voxel>& dense, RunContext& context, st
 /// Converts to packed data: the same codes, with tags of 0. `lost` as in to_sparse().
 PackedHermite to_packed(const FixedDense& dense, RunContext& context, std::size_t* lost = nullptr);
 
-/// Checks data from outside. @throws Error if an edge is crossed without a change of sign, if a crossing is
-/// missing (except those that ThesisVoxel loses), if a voxel holds a value that its type never writes, or as
-/// check_consistent() does for the same data as SparseHermite.
+/// Checks data of unknown origin. @throws Error if an edge is crossed without a change of sign, if a crossing
+/// is missing (except those that ThesisVoxel loses), if a voxel holds a value that its type never writes, or
+/// as check_consistent() does for the same data as SparseHermite.
 template <DenseVoxel Voxel>
 void check_consistent(const DenseHermite<Voxel>& dense, RunContext& context);
 
@@ -82,11 +82,11 @@ void check_consistent(const DenseHermite<Voxel>& dense, RunContext& context);
 /// the complement. Therefore
 ///   - where the operands cross an edge in opposite directions, the edge is crossed in the result between two
 ///     samples of one sign (trap T11);
-///   - a crossing that seems missing, because its normal has the code 0, loses against any other of a union
-///     outside and wins inside, and is missing from the result or replaced by a wrong one (trap T2);
-///   - the complement turns the normal 0xE000 along x or y, one near -z with the signs of the negative
-///     octant, into code 0: the crossing is lost, complementing again does not restore it, and De Morgan's
-///     laws do not hold. Its result does not pass check_consistent().
+///   - a crossing that appears to be missing, because its normal has the code 0, loses against any other in a
+///     union outside and wins inside, so it is missing from the result or replaced by a wrong one (trap T2);
+///   - the complement maps the normal 0xE000 along x or y, one near -z with the signs of the negative octant,
+///     to code 0: the crossing is lost, complementing again does not restore it, and De Morgan's laws do not
+///     hold. Its result does not pass check_consistent().
 ///
 /// An operand that is moved in and not shared gives up its nodes: branches that only one operand has are
 /// moved or dropped as a whole. A shared operand is copied as far as it is needed (`a` as a whole).
@@ -102,8 +102,8 @@ template <DenseVoxel Voxel>
 DenseHermite<Voxel> complement(DenseHermite<Voxel> hermite, RunContext& context);
 
 /// Registers the four grid types with OpenVDB, once, after initialize_openvdb(). OpenVDB opens a file with
-/// such a grid only if its type is registered, so a program calls this before it reads volumes; the functions
-/// above and hermite_file.h do by themselves.
+/// such a grid only if its type is registered, so a program must call this before it reads volumes; the
+/// functions above and hermite_file.h call it themselves.
 void register_dense_grids();
 
 }  // namespace hermesh

@@ -1,6 +1,6 @@
-// Connected regions of voxels: two neighbours are connected if no triangle crosses the grid edge between
-// them, and all space without blocks is connected. Needs neither normals nor a closed mesh. (Aldén 2011,
-// §5.3, floods similarly, along the shell of the surface.)
+// Connected regions of voxels: two neighbours are connected if no triangle intersects the grid edge between
+// them, and all space outside of the blocks is connected. Needs neither normals nor a closed mesh. (Aldén
+// 2011, §5.3, floods similarly, along the shell of the surface.)
 #pragma once
 
 #include <algorithm>
@@ -43,7 +43,7 @@ inline void set_bit(BlockMask& bits, unsigned voxel) { bits[voxel >> 6] |= std::
 /// Returns the bits of a block's voxels in the box between two voxels, both included.
 BlockMask box_bits(const BlockAt& block, const Voxel& from, const Voxel& to);
 
-/// Calls f(block) for the blocks that meet the box between two voxels.
+/// Calls f(block) for the blocks that overlap the box between two voxels.
 template <class F>
 void for_each_block_in(const Voxel& from, const Voxel& to, F&& f) {
   const BlockAt low = tile_of(from), high = tile_of(to);
@@ -88,8 +88,8 @@ std::vector<BlockMask> voxels_of(const Regions& regions, F&& is_in) {
   return result;
 }
 
-/// Finds the regions of voxels. `table` numbers the blocks, `crossed` has an entry for each. The result is
-/// independent of the thread schedule. @throws Cancelled.
+/// Finds the regions of voxels. `table` numbers the blocks, `crossed` has an entry for each: the edges that
+/// triangles intersect. The result is independent of the thread schedule. @throws Cancelled.
 Regions find_regions(const BlockTable& table, const std::vector<kernels::EdgeBits>& crossed,
                      const RunContext& context);
 

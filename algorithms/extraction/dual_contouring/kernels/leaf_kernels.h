@@ -1,6 +1,6 @@
 // The work on one 8³ leaf of dual contouring from a level set, compiled for several SIMD instruction sets;
-// all give the same bytes. No functions of the standard library are used here, because the linker may take a
-// function that two of them share from either.
+// all give the same bytes. No functions of the standard library are used here: if two of these files
+// instantiate the same inline function, the linker may keep either copy.
 //
 // Coordinates are those of the leaf: sample (x,y,z) from 0 to 7, cell (x,y,z) between samples x and x+1 and
 // so on. Bits are in the order of BlockMask, word x, bit 8y+z. A cell of the leaf has its corners in the leaf
@@ -21,20 +21,20 @@ struct UpperSigns {
   const std::uint64_t* inside[8];
 };
 
-/// Floats in the longest vectors.
+/// Number of floats in the longest SIMD vectors.
 inline constexpr int kLargestVector = 8;
 
 /// The cells of a leaf with a vertex, and the quads of its crossing edges. 96 bytes.
 struct LeafCells : ActiveCells {
-  std::uint32_t first_quad;  ///< number of the quad of the first crossing edge: by axis, in that by sample
+  std::uint32_t first_quad;  ///< number of the first crossing edge's quad; ordered by axis, then by sample
   std::uint16_t points, quads;
 };
 
-/// Lower neighbours that contain a cell with one of the leaf's crossing edges, as bits of 1 << (dx + 2dy +
-/// 4dz) for negated offsets: bit 1 is the neighbour below along x.
+/// Lower neighbours that contain a cell with one of the leaf's crossing edges, as bits 1 << (dx + 2dy + 4dz)
+/// for negated offsets: bit 1 is the lower neighbour along x.
 using LowerNeeds = unsigned;
 
-/// A crossing as a tangent plane, in voxels from the cell's centre.
+/// The tangent plane at an edge crossing, in voxels from the cell's centre.
 struct Plane {
   float point[3], normal[3];
 };
@@ -66,7 +66,7 @@ struct PlaceInput : edge_kernels::LeafInput {
   double corner[3];  ///< the leaf's first sample in the mesh's coordinates
   const PlaceRules* rules;
 };
-/// Below it single precision cannot decide which singular values to drop.
+/// Least truncation for which single precision can decide which singular values to drop.
 inline constexpr float kLeastTruncation = 0.03f;
 
 /// Layout of the crossings of all edges of a leaf's cells, by axis and first sample: offset, and the unit
@@ -79,7 +79,7 @@ struct RecordCube {
 /// Cells with one sheet each.
 struct PlainCells {
   const float (*records)[4];  ///< a RecordCube
-  const std::uint16_t* cell;  ///< 64x + 8y + z; kLargestVector more can be read, and are cells, too
+  const std::uint16_t* cell;  ///< 64x + 8y + z; padded with kLargestVector more valid cells
   int count;
 };
 /// Parameters of place_flat.
@@ -87,8 +87,8 @@ struct FlatPlaces {
   float truncation;    ///< no less than kLeastTruncation
   float smooth_share;  ///< DualContouringOptions::smooth_share()
   float margin;        ///< least distance of vertices from the cell's faces
-  /// Largest mean squared distance from the planes, if the minimiser lies within the cell, and if it is held
-  /// there.
+  /// Largest mean squared distance from the planes if the minimiser lies within the cell, and if it is
+  /// constrained to the cell.
   float most_error, most_error_held;
 };
 
@@ -101,12 +101,12 @@ struct PlaceOutput {
 /// Cells of several leaves whose planes are not nearly parallel, or whose minimiser lies outside of them. A
 /// leaf has few, which would leave most lanes of a vector idle.
 struct LaterCells {
-  /// Number from which they should be placed; a leaf may add 512.
+  /// Call place_later() once `count` is at least kEnough; a leaf may add 512 cells.
   static constexpr int kEnough = 64, kMost = kEnough + 512 + kLargestVector;
   static constexpr int kSums = 14;
 
   int count = 0;
-  float sums[kSums][kMost];  ///< sums over the cells' planes, as Quadrics has them
+  float sums[kSums][kMost];  ///< sums over the cells' planes, as in Quadrics
   float place[3][kMost];     ///< the minimiser, from the cell's centre, of cells that are not general
   bool general[kMost];       ///< has more than one large eigenvalue
   float records[kMost][12]
@@ -124,8 +124,8 @@ struct ConnectInput {
   /// Cells of the leaf and its lower neighbours, at dx + 2dy + 4dz for negated offsets; null if there is no
   /// leaf or none of its cells is needed.
   const LeafCells* cells[8];
-  const float* points;    ///< of the mesh; one number more can be read
-  const float* offsets;   ///< as in PlaceOutput; kLargestVector more can be read
+  const float* points;    ///< of the mesh; readable one number past the end
+  const float* offsets;   ///< as in PlaceOutput; readable kLargestVector numbers past the end
   float corner[3];        ///< the leaf's first sample in the mesh's coordinates
   float to_voxels[3][4];  ///< a step along each axis of the mesh in voxels, and 0
   bool mirrors;           ///< reverses the quads
@@ -140,9 +140,9 @@ struct Kernels {
   /// Computes the vertex of each cell as the mean of its crossings.
   void (*place_average)(const PlaceInput& input, const PlaceOutput& output);
   /// Computes the vertex of each cell as the minimiser of its quadratic error function, as dual_contouring()
-  /// does, or adds the cell to `later`, which has fewer than kEnough cells before.
+  /// does, or adds the cell to `later`, which must have fewer than kEnough cells before the call.
   void (*place_optimal)(const PlaceInput& input, const PlaceOutput& output, LaterCells& later);
-  /// Computes the vertices of the later cells, and removes these cells.
+  /// Computes the vertices of the cells in `later`, and empties it.
   void (*place_later)(const PlaceRules& rules, LaterCells& later);
   /// Computes the vertex of each cell as the minimiser of its quadratic error function, constrained to the
   /// cell. `place` gets the coordinates by axis, in voxels from the cell's first corner, and has room for
@@ -151,7 +151,7 @@ struct Kernels {
                      std::uint8_t* placed);
   /// Computes the vertex of each cell as the mean of its crossings; `place` is as for place_flat.
   void (*place_mean)(const PlainCells& cells, float* const* place);
-  /// Makes one quad for each crossing edge that starts in the leaf, four vertices each, by axis, then by
+  /// Writes the four vertices of the quad of each crossing edge that starts in the leaf, by axis, then by
   /// sample.
   void (*connect)(const ConnectInput& input, std::uint32_t* quads);
   static const Kernels sse2, avx2, avx512;

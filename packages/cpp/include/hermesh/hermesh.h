@@ -1,5 +1,5 @@
-// All public headers but hermesh/openvdb.h, which needs OpenVDB, and hermesh/validate.h, whose library is
-// under the GPL.
+// Includes all public headers except hermesh/openvdb.h, which needs OpenVDB, and hermesh/validate.h, whose
+// library is under the GPL.
 #pragma once
 
 #include "hermesh/context.h"
