@@ -47,9 +47,9 @@ class DistanceOracle {
   std::vector<std::uint32_t> triangles_within(const Eigen::Vector3d& point, double radius) const;
 
   /// The votes of a set of rays from a point for an odd or even number of intersections with the surface. A
-  /// ray in general position meets no edge, and its parity is right. The directions are irrational multiples
-  /// of one another; should a ray graze an edge even so, the others outvote it. Three rays that agree are
-  /// enough; at most nine are cast.
+  /// ray in general position intersects no edge, and its parity is correct. The directions are irrational
+  /// multiples of one another; should a ray graze an edge even so, the others outvote it. Three rays that
+  /// agree are enough; at most nine are cast.
   struct Vote {
     int odd = 0, cast = 0;
     bool inside() const { return 2 * odd > cast; }
@@ -65,7 +65,7 @@ class DistanceOracle {
   static Eigen::Vector3d direction(int number);
 
   /// Origins, at multiples of 8, of the blocks of 8³ samples whose centre is no farther from the surface than
-  /// the band (voxels) plus half a block's diagonal: all blocks that the band meets, and a few more.
+  /// the band (voxels) plus half a block's diagonal: all blocks that overlap the band, and a few more.
   std::vector<std::array<int, 3>> blocks_within(double band, const RunContext& context) const;
 
  private:

@@ -91,7 +91,7 @@ class Draw {
   std::unordered_set<std::uint64_t> seen_;
 };
 
-/// The figures of a part of the voxels. Parts are added in their order, so that sums do not depend on the
+/// The statistics of a part of the voxels. Parts are added in their order, so that sums do not depend on the
 /// threads.
 struct Tally {
   std::int64_t compared = 0, coarse = 0, stray = 0;

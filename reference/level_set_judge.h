@@ -58,8 +58,8 @@ class DistanceTruth {
                 const RunContext& context);
 
   /// Compares magnitudes. Samples of the level set are expected at world = mesh's origin + voxel_size ·
-  /// index. A voxel is held against the width of the band on the side that the level set itself takes it to
-  /// be on; a wrong sign is no matter of distance.
+  /// index. A voxel is compared with the width of the band on the side that the level set itself takes it to
+  /// be on; a wrong sign does not depend on the distance.
   /// @throws Error if the samples are elsewhere; Cancelled.
   DistanceReport judge(const LevelSet& level_set, const Eigen::Vector3d& origin, double exterior_band,
                        double interior_band, const RunContext& context) const;

@@ -190,7 +190,7 @@ PseudoNormals::PseudoNormals(const std::vector<Eigen::Vector3f>& points,
       edges_[kept++] = each;
   }
   edges_.resize(kept);
-  // A soup that is inside out as a whole is turned about.
+  // A soup that is inside out as a whole is reversed.
   double volume = 0.0;
   Vector3d middle = Vector3d::Zero();
   for (const Eigen::Vector3f& point : points) middle += point.cast<double>() / double(points.size());

@@ -102,7 +102,7 @@ TEST(PseudoNormalVoxelizer, SolidsAreFilledByTilesAndFramesFollow) {
   EXPECT_FLOAT_EQ(grid.tree().getValue({100, 0, 0}), 0.75f);
 }
 
-/// Near a sheet that lies within another part the normal says outside, though the point is inside of the
+/// Near a sheet that lies within another part the normal indicates outside, though the point is inside of the
 /// union: on one side of each wall that dives into the other box a layer of the band's width comes out wrong.
 TEST(PseudoNormalVoxelizer, FailsWherePartsOverlap) {
   const Eigen::Vector3f shift(0.95f, 0.85f, 0.75f);
@@ -115,8 +115,8 @@ TEST(PseudoNormalVoxelizer, FailsWherePartsOverlap) {
   EXPECT_GT(20 * signs.wrong, signs.compared) << signs.wrong << " of " << signs.compared;
 }
 
-/// One face of six is turned over, as in models that nobody oriented: before it the normal says inside,
-/// behind it outside.
+/// One face of six is reversed, as in unoriented models: in front of it the normal indicates inside, behind
+/// it outside.
 TEST(PseudoNormalVoxelizer, FailsWhereFacesAreTurnedOver) {
   PolygonMesh mesh = box({-1, -1, -1}, {1, 1, 1});
   std::swap(mesh.quads[0][1], mesh.quads[0][3]);

@@ -1,4 +1,4 @@
-// How long signs take on meshes that cross themselves, beside OpenVDB.
+// Times of signs on meshes that intersect themselves, compared with OpenVDB.
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>
 

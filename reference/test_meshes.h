@@ -11,7 +11,7 @@ namespace hermesh::test {
 
 /// Sphere about a centre: a subdivided octahedron of 8·4^levels triangles with its points on the sphere.
 PolygonMesh sphere(double radius, int levels, const Eigen::Vector3d& centre = Eigen::Vector3d::Zero());
-/// Cube of six quads with edge 2·half, turned by 20°, 30° and 40° about x, y and z.
+/// Cube of six quads with edge 2·half, rotated by 20°, 30° and 40° about x, y and z.
 PolygonMesh turned_cube(double half);
 /// The rotation of turned_cube().
 Eigen::Matrix3d turn();
@@ -19,7 +19,7 @@ Eigen::Matrix3d turn();
 PolygonMesh torus(double major, double minor, int rings, int sides);
 /// Two meshes as one; the second one's points are given relative to the first one's origin.
 PolygonMesh joined(const PolygonMesh& first, const PolygonMesh& second);
-/// The mesh with all polygons turned over.
+/// Returns the mesh with all polygons reversed.
 PolygonMesh reversed(PolygonMesh mesh);
 
 double signed_volume(const PolygonMesh& mesh);

@@ -26,7 +26,7 @@ int crossing(const Corners& triangle, const Vector3d& point, const Vector3d& dir
   const double u = direction.dot(a.cross(b)), v = direction.dot(b.cross(c)), w = direction.dot(c.cross(a));
   const bool front = u > 0.0 && v > 0.0 && w > 0.0, back = u < 0.0 && v < 0.0 && w < 0.0;
   if (!front && !back) return 0;
-  const double volume = a.dot(b.cross(c));  // its sign says on which side of the plane the point lies
+  const double volume = a.dot(b.cross(c));  // its sign is the side of the plane on which the point lies
   return front ? (volume > 0.0 ? 1 : 0) : (volume < 0.0 ? -1 : 0);
 }
 

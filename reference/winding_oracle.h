@@ -9,8 +9,8 @@
 namespace hermesh {
 
 /// Sum of all triangles' solid angles (van Oosterom and Strackee, 1983) over 4π: 1 inside a closed surface
-/// with its normals outwards, 0 outside, between them near the holes of an open one. The sum takes some
-/// ten nanoseconds a triangle.
+/// with its normals outwards, 0 outside, between them near the holes of an open one. The sum takes some ten
+/// nanoseconds per triangle.
 double winding_number(const std::vector<Corners>& triangles, const Eigen::Vector3d& point);
 
 /// Computes winding_number() sooner. The soup less a cone over its boundary (every edge as often as it is
@@ -22,7 +22,7 @@ class WindingOracle {
   /// Keeps a reference to the surface.
   explicit WindingOracle(const DistanceOracle& surface);
 
-  /// The soup's winding number at a point, with its sign turned if the soup as a whole is inside out, that
+  /// The soup's winding number at a point, with its sign reversed if the soup as a whole is inside out, that
   /// is, if its volume is negative about every point of its box. The volume of an open soup depends on that
   /// point; if even the sign of the volume does, as for a sheet, the winding is taken as it was given.
   double operator()(const Eigen::Vector3d& point) const;
@@ -54,7 +54,7 @@ class WindingOracle {
 /// corners bound it. A triangle of which only some of these points do is split in four, until the pieces'
 /// edges are shorter than `finest` (voxels); so the boundary ends no farther than `finest` from where the
 /// surface dives into the solid. Features that pass between all four points are overlooked, so the triangles
-/// have to be small beside the features.
+/// have to be small compared with the features.
 /// @throws Cancelled.
 std::vector<Corners> solid_boundary(const DistanceOracle& surface, const WindingOracle& solid, double finest,
                                     const RunContext& context);

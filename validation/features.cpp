@@ -46,7 +46,7 @@ class WeldedSurface {
     });
   }
 
-  // Returns the edges in which exactly two triangles meet, by their points in increasing order.
+  // Returns the edges with exactly two triangles, by their points in increasing order.
   const std::vector<Edge>& edges() const { return edges_; }
   const Eigen::Vector3d& point(std::uint32_t p) const { return points_[p]; }
   Eigen::Vector3d direction(const Edge& e) const {
@@ -76,7 +76,7 @@ class WeldedSurface {
   std::vector<Triangle> triangles_;
   std::vector<Edge> edges_;
   std::vector<std::array<std::uint32_t, 3>>
-      edge_of_;  // of each triangle's side k to k + 1; kNoEdge at a border
+      edge_of_;  // of each triangle's side k to k + 1; kNoEdge at a boundary
 };
 
 double WeldedSurface::turning(const Edge& e) const {

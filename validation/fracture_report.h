@@ -45,7 +45,7 @@ struct FractureReport {
   std::int64_t intersecting_pairs = 0;  ///< pairs of triangles of all pieces, each seam taken once
   std::int64_t nested_components = 0;   ///< components of a piece inside another piece
   std::int64_t broken_pieces = 0;   ///< pieces not closed, manifold, oriented and free of self-intersections
-  std::vector<std::string> places;  ///< a sentence for the first defects of each kind
+  std::vector<std::string> places;  ///< a message for each of the first defects of each kind
 
   /// The sum of the pieces' volumes less the expected volume of the whole, relative to the latter. Not
   /// exactly 0, because the vertices of cells along the cuts are recomputed.

@@ -32,8 +32,8 @@ HausdorffBound certified_distance(const TriangleSoup& from, const TriangleTree& 
 /// No single triangle of a fine flat surface is near all of a large triangle, and repeated halving of the
 /// latter ends only at pieces as small as `limit` along all sides of the fine ones. So the piece is cut along
 /// the sides of the triangles within `reach` of it, into convex parts that each lie within `limit` of one
-/// triangle: the distance to a triangle is a convex function, so that the corners of a part decide. The
-/// position of the cuts affects only if a bound is found, never its validity.
+/// triangle: the distance to a triangle is a convex function, so the corners of a part decide. The position
+/// of the cuts affects only if a bound is found, never its validity.
 ///
 /// No bound is found if more than a few triangles are near; the caller then has to cut the piece. The closest
 /// triangle of each point of `piece` must be within `reach` of it.

@@ -14,10 +14,10 @@ struct LibraryFindings {
 /// Counts by OpenMesh or CGAL and compares with ours. A half-edge structure holds exactly the meshes in which
 /// no polygon repeats a corner and which have no non-manifold edge or vertex and no inconsistent edge. Both
 /// functions refuse any other mesh, with the position of the first defect; `ours` must hold the counts of
-/// topology.h. Every difference between a library and ours becomes a sentence: if the mesh loads, and if it
+/// topology.h. Every difference between a library and ours becomes a message: if the mesh loads, and if it
 /// does boundary edges, components (by shared edges, which is equivalent in such a mesh), Euler
 /// characteristic and number of polygons, exactly, and volume (about the same centre as ours) and area to
-/// 1e-9 of the area, for the volume times the diagonal. Positions in sentences are the mesh's coordinates
+/// 1e-9 of the area, for the volume times the diagonal. Positions in messages are the mesh's coordinates
 /// times `unit`. @throws Cancelled.
 LibraryCounts count_with_openmesh(const MeshFile& mesh, const MeshReport& ours, RunContext& context,
                                   double unit = 1.0);

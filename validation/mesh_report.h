@@ -1,4 +1,4 @@
-// The validation report of a mesh: counts, the positions of the first defects of each kind, and sentences.
+// The validation report of a mesh: counts, the positions of the first defects of each kind, and messages.
 #pragma once
 
 #include <Eigen/Core>
@@ -37,10 +37,10 @@ struct Places {
 struct LibraryCounts {
   std::string library;  ///< "OpenMesh" or "CGAL"
   bool loaded = false;
-  std::string refusal;  ///< one sentence, with the position, if not loaded
+  std::string refusal;  ///< a message, with the position, if not loaded
   std::int64_t boundary_edges = 0, components = 0, euler_characteristic = 0;
   double volume = 0.0, area = 0.0;
-  std::vector<std::string> disagreements;  ///< one sentence for each count that differs from ours
+  std::vector<std::string> disagreements;  ///< a message for each count that differs from ours
 };
 
 struct SelfIntersections {

@@ -21,7 +21,7 @@ Eigen::Vector3d position(const Mesh& mesh, Mesh::VertexHandle v) {
   return {p[0], p[1], p[2]};
 }
 
-// Adds all polygons. Returns a sentence about the first refused one, or an empty string.
+// Adds all polygons. Returns a message about the first rejected one, or an empty string.
 std::string load(const MeshFile& file, double unit, Mesh& mesh, const RunContext& context) {
   const auto polygons = std::size_t(polygon_count(file));
   mesh.reserve(file.points.size(), file.points.size() + polygons, polygons);
@@ -43,7 +43,7 @@ std::string load(const MeshFile& file, double unit, Mesh& mesh, const RunContext
   return {};
 }
 
-// Returns a sentence about the first vertex with several fans, or an empty string. OpenMesh accepts two fans
+// Returns a message about the first vertex with several fans, or an empty string. OpenMesh accepts two fans
 // at one vertex if one of them is open when the other is added. Then either the vertex has two gaps, or a
 // walk around it misses polygons.
 std::string find_singular_vertex(const MeshFile& file, double unit, const Mesh& mesh) {

@@ -93,7 +93,7 @@ TEST(SelfIntersection, FoldBetweenNeighbours) {
 TEST(SelfIntersection, QuadFoldsOntoItself) {
   MeshFile mesh;
   mesh.points = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {1, 1, 0}};
-  mesh.quads = {{0, 1, 2, 3}};  // its sides cross, so that either diagonal folds it
+  mesh.quads = {{0, 1, 2, 3}};  // its sides cross, so either diagonal folds it
   EXPECT_EQ(search(mesh).edge_sharing, 1);
   // A dart: 1 and 3 are on one side of the diagonal 02, and there is one surface in a plane, wherever the
   // file starts.
@@ -103,7 +103,7 @@ TEST(SelfIntersection, QuadFoldsOntoItself) {
   mesh.quads = {{1, 2, 3, 0}};
   EXPECT_EQ(search(mesh).pairs, 0);
   mesh.points[1].z() =
-      0.1;  // in space the order says which of two surfaces it is, and this one does not fold
+      0.1;  // in space the order determines which of two surfaces it is, and this one does not fold
   mesh.quads = {{1, 2, 3, 0}};
   EXPECT_EQ(search(mesh).pairs, 0);
 }

@@ -42,7 +42,7 @@ std::vector<Eigen::Vector3d> ray_directions(double length) {
 }
 
 // Returns how a segment crosses a triangle: 1 if it leaves through the front, −1 if it enters through it, 0
-// if it misses, and nothing if it meets an edge or ends in the triangle's plane. Exact.
+// if it misses, and nothing if it intersects an edge or ends in the triangle's plane. Exact.
 std::optional<int> crossing_of(const Corners& t, const Eigen::Vector3d& from, const Eigen::Vector3d& to) {
   const int start = orientation(t[0], t[1], t[2], from), end = orientation(t[0], t[1], t[2], to);
   if (start == end && start != 0) return 0;
@@ -56,8 +56,8 @@ std::optional<int> crossing_of(const Corners& t, const Eigen::Vector3d& from, co
   return -start;
 }
 
-// Returns true if the other components wind around a component, so that it is a cavity if it faces inwards.
-// Rays start at its vertices, one after another, until one of them meets no edge.
+// Returns true if the other components wind around a component, so it is a cavity if it faces inwards. Rays
+// start at its vertices, one after another, until one of them intersects no edge.
 bool is_enclosed(const TriangleSoup& soup, const TriangleTree& tree,
                  const std::vector<std::uint32_t>& component, const std::vector<std::uint32_t>& triangles) {
   const std::uint32_t own = component[soup.triangles[triangles[0]][0]];

@@ -30,8 +30,8 @@ class FreeCells {
   double cell() const { return cell_; }
   /// Returns true if the flood reached the point's cube. Points outside the box are free.
   bool free(const Eigen::Vector3d& point) const { return state_at(point) == kFree; }
-  /// Returns true if neither the flood nor a triangle reaches the point's cube, so that triangles separate
-  /// the point from infinity except for gaps narrower than a cube or two.
+  /// Returns true if neither the flood nor a triangle reaches the point's cube, so triangles separate the
+  /// point from infinity except for gaps narrower than a cube or two.
   bool enclosed(const Eigen::Vector3d& point) const { return state_at(point) == kUnseen; }
 
  private:

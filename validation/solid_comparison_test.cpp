@@ -196,7 +196,7 @@ TEST(OuterBoundary, OfSoupsThatHideWalls) {
 }
 
 TEST(OuterBoundary, OfBricksIsTheirUnionsHoweverTheyAreTurned) {
-  // Turned, faces that lie upon one another do so but for rounding.
+  // In a rotated solid, coincident faces coincide only up to rounding.
   for (int seed = 0; seed < 16; ++seed) {
     std::mt19937 random{std::uint32_t(seed)};
     Bricks bricks = random_bricks(random, 1);
@@ -289,7 +289,7 @@ TEST(SolidComparison, NeverAFalseVerdictOnOpenOrUnorientedReferences) {
     EXPECT_NE(compared(cube, reference, 0.0, 4'000).verdict, Verdict::differs);
     EXPECT_NE(compared(cube, soup_of_triangles(reference), 0.0, 4'000).verdict, Verdict::differs);
   }
-  // The mesh is closed, so that parity determines the inside everywhere.
+  // The mesh is closed, so parity determines the inside everywhere.
   EXPECT_EQ(compared(cube, flipped).verdict, Verdict::same);
   EXPECT_EQ(compared(cube, flipped).unknown_volume.value, 0.0);
   EXPECT_EQ(compared(box({0, 0, 0}, {1, 1, 0.5}), flipped, 0.02).verdict, Verdict::differs);

@@ -19,7 +19,7 @@ struct OptionSpec {
   double minimum = 0.0;
   double maximum = 1e300;
   /// Settings of the variant's other options, each "name=value" or "name=value|value…". This option has no
-  /// effect unless all of them hold, so that giving it is then an error.
+  /// effect unless all of them hold, so giving it is then an error.
   std::vector<std::string> only_with = {};
 };
 

@@ -61,7 +61,7 @@ class PlaceTree {
     while (node /= 2) boxes_[node] = boxes_[2 * node].merged(boxes_[2 * node + 1]);
   }
 
-  /// Returns true if f(corner) holds for a chosen corner in the counter-clockwise triangle abc, border
+  /// Returns true if f(corner) holds for a chosen corner in the counter-clockwise triangle abc, boundary
   /// included.
   template <class F>
   bool any_in(const Vector2d& a, const Vector2d& b, const Vector2d& c, F&& f) const {
@@ -138,7 +138,7 @@ class Candidates {
 };
 
 /// A ring of corners from which ears are cut off. Invariant: the neighbors of a corner outside a set of
-/// candidates are unchanged since it failed the test, so that few corners are tested again.
+/// candidates are unchanged since it failed the test, so few corners are tested again.
 class Ring {
  public:
   explicit Ring(std::span<const Vector3d> corners)
@@ -170,7 +170,7 @@ class Ring {
       // The direct neighbour would make a fan of slivers.
       at = next_[cut(*corner)];
     }
-    // If the remaining triangle faces the other way, the border crosses itself.
+    // If the remaining triangle is reversed, the boundary intersects itself.
     if (area_at(at) < -flat_) return {};
     triangles.push_back({before_[at], at, next_[at]});
     return triangles;
@@ -200,8 +200,8 @@ class Ring {
     if (const std::optional<std::uint32_t> ear =
             first(perhaps_ears_, at, context, [&](std::uint32_t i) { return is_ear(i); }))
       return ear;
-    // A corner becomes an ear when a neighbour is cut off; where the border touches itself, also when another
-    // corner is. So all are tested again, but not for every corner of a straight line.
+    // A corner becomes an ear when a neighbour is cut off; where the boundary touches itself, also when
+    // another corner is. So all are tested again, but not for every corner of a straight line.
     const auto flat_one = [&] {
       return first(perhaps_flat_, at, context,
                    [&](std::uint32_t i) { return std::abs(area_at(i)) <= flat_; });
@@ -237,7 +237,7 @@ class Ring {
     return !reflex_.any_in(a, b, c, [&](std::uint32_t i) {
       const Vector2d& p = places_[i];
       if (i == before_[at] || i == next_[at]) return false;
-      // Where the border returns to the tip it may enter between the sides; from the two other corners it
+      // Where the boundary returns to the tip it may enter between the sides; from the two other corners it
       // could not without a corner inside.
       if (p == b) return is_between(a, b, c, places_[before_[i]]) || is_between(a, b, c, places_[next_[i]]);
       return p != a && p != c;

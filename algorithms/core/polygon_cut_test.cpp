@@ -180,8 +180,8 @@ TEST(ClipEars, ASpiral) {
   expect_cover(polygon, enclosed(polygon));
 }
 
-/// A zigzag over a straight border of as many corners, which leaves two straight rows when its tips are cut
-/// off.
+/// A zigzag over a straight boundary with the same number of corners, which leaves two straight rows when its
+/// tips are cut off.
 Polygon zigzag(int corners) {
   Polygon polygon;
   const int half = corners / 2;

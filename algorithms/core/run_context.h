@@ -1,4 +1,4 @@
-// Progress, cancellation, notes, figures and times of a run.
+// Progress, cancellation, notes, statistics (`figures`) and times of a run.
 #pragma once
 
 #include <atomic>

@@ -67,7 +67,7 @@ std::vector<Triangle> all_triangles(std::vector<Triangle> triangles, const Large
 /// a triangle is shown if one of its corners is.
 void show(CertifiedPolygons& polygons, const std::function<bool(std::size_t, int, std::uint32_t)>& is_shown);
 
-/// Records the uniform mesh's counts as figures of the run.
+/// Records the uniform mesh's counts as statistics of the run.
 void report(const UniformCounts& counts, RunContext& context);
 
 /// Returns the uniform mesh itself, for tolerance 0.

@@ -160,7 +160,7 @@ LevelSet frustum_mask(const Frustum& frustum, int resolution, RunContext& contex
     context.note(
         "the frustum's near end is narrower than two voxels of its mask, which may lose it there; "
         "take planes nearer to what is seen, or more voxels");
-  // The leaves that the box and the band around it meet; index zero is at the world's origin.
+  // The leaves that overlap the box and the band around it; index zero is at the world's origin.
   std::array<int, 3> first, count;
   for (int a = 0; a < 3; ++a) {
     first[a] = static_cast<int>(std::floor((box.min()[a] - band) / voxel / 8.0));

@@ -14,7 +14,7 @@ namespace hermesh {
 /// Returns the options `hermite` (exact, level-set or auto), `representation` and `normals` (16-bit code).
 std::vector<OptionSpec> hermite_options();
 
-/// Returns true if edge crossings are to be taken from polygons, or from Hermite data made of polygons.
+/// Returns true if edge crossings are to be taken from polygons, or from Hermite data made from polygons.
 /// `auto` uses them only at the isovalue 0, where the surface lies on the polygons.
 bool wants_polygons(const ExtractionInput& input);
 
@@ -25,17 +25,17 @@ const PolygonMesh& polygons_at_isovalue(const ExtractionInput& input, const std:
                                         const std::string& instead);
 
 /// Returns the data with the representation 'sparse', never stored as floats if from a level set; none with
-/// another representation. Adds figures to the run's context.
+/// another representation. Adds statistics to the run's context.
 /// @throws Error for exact data without polygons at the isovalue
 std::optional<PackedHermite> packed_hermite_input(const ExtractionInput& input, const std::string& variant);
 
-/// Returns the data in the thesis's voxels, whatever `representation` is. Adds figures to the run's context,
-/// except the lost crossings, which the caller counts.
+/// Returns the data in the thesis's voxels, whatever `representation` is. Adds statistics to the run's
+/// context, except the lost crossings, which the caller counts.
 /// @throws Error for exact data without polygons at the isovalue
 ThesisDense thesis_hermite_input(const ExtractionInput& input, const std::string& variant);
 
-/// Returns the data after a round trip through the representation. Adds figures, and a note on crossing edges
-/// without a polygon, to the run's context. `variant` is the extractor's name, for messages.
+/// Returns the data after a round trip through the representation. Adds statistics, and a note on crossing
+/// edges without a polygon, to the run's context. `variant` is the extractor's name, for messages.
 /// @throws Error for exact data without polygons at the isovalue, and if `needs_normals` but the
 /// representation has none
 FloatHermite hermite_input(const ExtractionInput& input, const std::string& variant, bool needs_normals);

@@ -73,7 +73,7 @@ void interpolate(const Grid& grid, const PolygonMesh& mesh, MeshAttribute& attri
       double sums[3] = {}, weights = 0.0;
       for (const WeightedCorner& corner : corners_around(index_of(mesh, point, grid.transform()))) {
         typename Grid::ValueType value;
-        // Inactive samples are no data; the division below normalises the weights of the others.
+        // Inactive samples have no data; the division below normalises the weights of the others.
         if (corner.weight <= 0.0 || !access.probeValue(corner.at, value)) continue;
         weights += corner.weight;
         for (int i = 0; i < components; ++i) sums[i] += corner.weight * component_of(value, i);

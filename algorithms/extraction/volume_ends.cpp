@@ -36,7 +36,7 @@ struct EndEdge {
 /// Decides which edges with a change of sign are ends of the data.
 struct EndRule {
   bool level_set = false;
-  openvdb::CoordBBox box;               ///< box of the data, where it is no level set
+  openvdb::CoordBBox box;               ///< box of the data, unless it is a level set
   std::array<float, 3> largest_rise{};  ///< of distances from one sample to the next along each axis
 
   bool operator()(const Coord& inside, float value, float beyond, int axis, int side) const {
@@ -288,8 +288,8 @@ class PlaneCut {
     if (size == 4) mesh_.quads.push_back(part);
   }
 
-  /// Returns the vertex where the edge from a to b meets the plane, the same for both polygons of the edge.
-  /// It is computed from the lower index, so the order of the polygons does not matter.
+  /// Returns the vertex where the edge from a to b intersects the plane, the same for both polygons of the
+  /// edge. It is computed from the lower index, so the order of the polygons does not matter.
   std::uint32_t point_between(std::uint32_t a, std::uint32_t b) {
     if (a > b) std::swap(a, b);
     const auto [entry, is_new] =

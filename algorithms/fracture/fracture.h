@@ -2,7 +2,7 @@
 //
 //   labelled   every sample of the Hermite grid gets the number of its piece, and all pieces are meshed
 //              together, so that a seam is one surface with two sides (labelled_mesh.h). Ours, the default.
-//   thesis     §7.1 as printed (thesis_fracture.h): cutters one after another, each piece meshed by itself.
+//   thesis     §7.1 as printed (thesis_fracture.h): cutters one after another, each piece meshed separately.
 //              Its gaps are measured, not repaired.
 #pragma once
 

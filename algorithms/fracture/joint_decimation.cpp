@@ -34,7 +34,8 @@ std::vector<std::uint8_t> rims(const JointMesh& mesh) {
 
 void decimate_joint_mesh(JointMesh& mesh, double tolerance, RunContext& context) {
   if (tolerance <= 0 || mesh.triangles.empty()) return;
-  // All patches are decimated as one mesh, so the proof that no two triangles meet holds across pieces, too.
+  // All patches are decimated as one mesh, so the proof that no two triangles intersect also holds across
+  // pieces.
   const FilePoints file(mesh.placement);
   const FineMesh fine(mesh.points, mesh.triangles, context);
   // Edges shared by more than two triangles have their ends on a patch boundary, and patch boundaries are

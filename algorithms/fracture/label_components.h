@@ -1,4 +1,4 @@
-// Pieces that fall apart become several, and slivers go to a neighbour.
+// Splits disconnected pieces, and merges slivers into a neighbour.
 #pragma once
 
 #include <cstdint>
@@ -22,7 +22,7 @@ struct ComponentOptions {
 
 /// A piece that was given to another one.
 struct MergedSliver {
-  std::uint32_t code;  ///< the code of the piece that is no more, as in LabelledSolid::codes
+  std::uint32_t code;  ///< the code of the piece that no longer exists, as in LabelledSolid::codes
   std::uint64_t samples;
   std::uint32_t into_code;  ///< the code of the piece that has its samples now
 };

@@ -209,9 +209,9 @@ Solid plate(const Eigen::Vector3d& corner, const Eigen::Vector3d& side, const Ei
 
 TEST(JointMesh, PartsTwoPiecesThatHangTogetherAcrossFacesOnly) {
   // The whole solid is four samples that form a thin plate: two opposite lattice edges of one cell. The
-  // normals join them across the cell's two faces at the ends of the edges, so that the cell has two sheets,
-  // each of which passes along both edges; and no cell has a cut, even if the two edges belong to two pieces.
-  // (A single ambiguous face is not joined: it would be pinched in both of its cells.)
+  // normals join them across the cell's two faces at the ends of the edges, so the cell has two sheets, each
+  // of which passes along both edges; and no cell has a cut, even if the two edges belong to two pieces. (A
+  // single ambiguous face is not joined: it would be pinched in both of its cells.)
   for (int axis = 0; axis < 3; ++axis)
     for (const int turn : {1, -1}) {
       SCOPED_TRACE(std::to_string(axis) + " " + std::to_string(turn));

@@ -12,7 +12,7 @@ namespace hermesh {
 /// The labels of a cell's corners, numbered as in cell_sheets.h; 0 is the outside.
 using CornerLabels = std::array<std::uint32_t, 8>;
 
-/// Returns true if an edge of the cell has its ends in two pieces, so that the cell is a joint.
+/// Returns true if an edge of the cell has its ends in two pieces, so the cell is a joint.
 bool has_cut(const CornerLabels& labels);
 
 /// A *sheet* of a joint is a set of crossings of its edges, connected by the lines that the surfaces draw on

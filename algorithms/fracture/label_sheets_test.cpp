@@ -112,8 +112,8 @@ TEST(LabelSheets, BothSidesOfAFaceCutItAlikeWhateverTheLabelsAreCalled) {
     }
 }
 
-/// Crossings on one face are in one sheet, but for the two segments of an ambiguous face; every sheet has at
-/// least three crossings.
+/// Crossings on one face are in one sheet, except for the two segments of an ambiguous face; every sheet has
+/// at least three crossings.
 TEST(LabelSheets, HoldWhatHangsTogetherOnTheFaces) {
   for (const CornerLabels& labels : all_patterns(0)) {
     const JointSheets joint = joint_sheets(labels);

@@ -179,7 +179,7 @@ bool touches_in_a_point(const CellBlocks& cells, std::int32_t block, int cell, i
 void find_joined_faces(LabelledSolid& solid, const FloatHermite& hermite, const Cutters& cutters,
                        RunContext& context) {
   // The solid is of one piece here, so this is the lattice of the whole: no cell is a joint, and faces are
-  // cut as the normals of the original surface have it (CellBlocks::sheets()).
+  // cut by the normals of the original surface (CellBlocks::sheets()).
   const LabelledGrid grid(solid, hermite, cutters, context);
   const CellBlocks cells(grid, context);
   const Stage stage(context, "find joined faces");

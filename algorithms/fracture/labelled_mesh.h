@@ -43,7 +43,7 @@ JointMesh joint_mesh(const LabelledGrid& grid, const DualContouringOptions& opti
 /// Which triangles of a joint mesh bound each piece.
 class PieceTriangles {
  public:
-  /// A triangle of the joint mesh as one of its pieces has it.
+  /// A triangle of the joint mesh, oriented as in one of its pieces.
   struct Side {
     std::uint32_t triangle;
     bool reversed;  ///< the piece is in front of the triangle

@@ -15,7 +15,7 @@
 
 namespace hermesh {
 
-/// A whole number for each sample of a fixed list of blocks. A block of one value takes 16 bytes, any other 2
+/// An integer for each sample of a fixed list of blocks. A block of one value takes 16 bytes, any other 2
 /// KiB: the inside of a solid is mostly of one piece.
 class LabelField {
  public:

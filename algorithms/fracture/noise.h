@@ -16,7 +16,7 @@ constexpr std::uint64_t hashed(std::uint64_t x) {
   return x ^ (x >> 31);
 }
 
-/// A sequence of pseudorandom numbers: hashed() of consecutive whole numbers.
+/// A sequence of pseudorandom numbers: hashed() of consecutive integers.
 class Random {
  public:
   explicit Random(std::uint64_t seed) : state_(hashed(seed)) {}
@@ -24,7 +24,7 @@ class Random {
   std::uint64_t bits() { return hashed(state_++); }
   /// A random number, uniform in [0, 1).
   double uniform() { return static_cast<double>(bits() >> 11) * 0x1p-53; }
-  /// A random whole number, uniform in 0 … n − 1 but for a bias of less than n / 2⁵³.
+  /// Returns a random integer, uniform in 0 … n − 1 except for a bias of less than n / 2⁵³.
   std::uint64_t below(std::uint64_t n) {
     return static_cast<std::uint64_t>(uniform() * static_cast<double>(n));
   }

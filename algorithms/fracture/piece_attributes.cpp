@@ -35,7 +35,7 @@ std::array<Vector3d, 2> frame_of_triangle(const PolygonMesh& mesh, const Triangl
   return {Vector3d::Unit((axis + 1) % 3), Vector3d::Unit((axis + 2) % 3)};
 }
 
-/// The polygons' attribute of that name, of whole numbers. @throws Error if the piece has none.
+/// Returns the polygons' integer attribute of that name. @throws Error if the piece has none.
 const std::vector<std::int32_t>& whole_numbers(const PolygonMesh& mesh, const std::string& name) {
   for (const MeshAttribute& a : mesh.attributes)
     if (a.name == name && a.domain == AttributeDomain::polygon) return std::get<1>(a.values);
@@ -61,8 +61,8 @@ void take(const MeshAttribute& from, const std::array<std::size_t, 3>& elements,
   }
 }
 
-/// An attribute of the same kind with the requested number of elements, all of them 0 or, for whole numbers,
-/// −1 (none).
+/// An attribute of the same kind with the requested number of elements, all of them 0 or, for integers, −1
+/// (none).
 MeshAttribute empty_like(const MeshAttribute& source, std::size_t elements) {
   MeshAttribute result{source.name, source.domain, source.components, {}, source.labels};
   const std::size_t values = elements * static_cast<std::size_t>(source.components);

@@ -28,10 +28,10 @@ void add_cut_uv(PolygonMesh& piece, const PlaneOfNeighbour& plane);
 /// Transfers the attributes of the original to the original polygons of pieces, from the nearest of its
 /// polygons. An attribute of polygons is taken from the polygon nearest to the middle of the triangle, one of
 /// corners from that polygon's nearest point to each corner, one of points from the polygon nearest to each
-/// point. Floats are interpolated, whole numbers are taken from the nearest corner. Cut polygons and their
-/// corners get 0, or −1 for whole numbers; points of cuts take the values of the nearest polygon, as those on
-/// the boundary of a cut must. The attribute "uv", of corners or of points, is written to the corners that
-/// add_cut_uv() made.
+/// point. Floats are interpolated, integers are taken from the nearest corner. Cut polygons and their corners
+/// get 0, or −1 for integers; points of cuts take the values of the nearest polygon, as those on the boundary
+/// of a cut must. The attribute "uv", of corners or of points, is written to the corners that add_cut_uv()
+/// made.
 class SourceAttributes {
  public:
   /// The source has to outlive this object. `voxel_size` (world units) is the scale of distances.

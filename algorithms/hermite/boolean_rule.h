@@ -93,7 +93,7 @@ class BooleanRule {
     if (Code::offset(a) == Code::offset(b)) return prefers_normal_of_b<Code>(a, b);
     return prefers_offset_of_b<Code>(a, b, first_inside);
   }
-  /// Returns a crossing of the second operand as it is in the result.
+  /// Returns the form that a crossing of the second operand has in the result.
   template <class Code>
   typename Code::Crossing turned(const typename Code::Crossing& b) const {
     return turns_b_ ? Code::negated(b) : b;

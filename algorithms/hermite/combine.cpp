@@ -178,7 +178,7 @@ class Combination {
     std::size_t end_of_column = begin;
     if (last_of_other && same_column(*last_of_other, own.leaves[begin])) {
       const Lower& lower = own.leaves[begin].lower;
-      // The greatest integer is no multiple of 8, so no leaf starts there.
+      // The greatest integer is not a multiple of 8, so no leaf starts there.
       end_of_column = first_not_before(own.leaves, begin, end,
                                        {lower[0], lower[1], std::numeric_limits<std::int32_t>::max()});
       // Beyond its last leaf in the column the sign is the same over the whole layer.
@@ -211,7 +211,7 @@ class Combination {
   static void append(Chunk& chunk, const Run& run) {
     if (!chunk.runs.empty()) {
       Run& last = chunk.runs.back();
-      // A run that continues the previous one becomes part of it, so that fill() copies in one piece.
+      // A run that continues the previous one becomes part of it, so fill() copies in one piece.
       if (last.from == run.from && last.a + last.count == run.a && last.b + last.count == run.b) {
         last.count += run.count;
         return;

@@ -1,5 +1,5 @@
 // Unions, intersections, differences and complements of Hermite data (constructive solid geometry; Aldén
-// 2011, §7.1), on the crossings as they are stored: nothing is unpacked.
+// 2011, §7.1), on the stored form of the crossings: nothing is unpacked.
 #pragma once
 
 #include "algorithms/core/run_context.h"

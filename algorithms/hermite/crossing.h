@@ -1,4 +1,4 @@
-// One edge crossing: the point where the surface meets a grid edge, and its normal (Aldén 2011, §2.8).
+// One edge crossing: the point where the surface intersects a grid edge, and its normal (Aldén 2011, §2.8).
 #pragma once
 
 #include <array>

@@ -25,7 +25,7 @@ struct SampledVolume {
 /// Determines which samples are data. Near the surface at 0 of a level set all others have the background's
 /// magnitude, which is sufficient. If the band is narrower inside, they have less there; at other isovalues
 /// the band may be wider on that side than the background, and a background of 0 is useless. Then, and in any
-/// other volume, the active samples are data. Returns nothing if this cannot be decided by tiles alone.
+/// other volume, the active samples are data. Returns nothing if the tiles are not enough to decide this.
 std::optional<SampledVolume> sampled_volume(const LeafPlaces& leaves, const LevelSet& level_set);
 /// Determines which samples are data, if necessary by the samples of the leaves.
 SampledVolume sampled_volume(const LeafTable& table, const LevelSet& level_set);

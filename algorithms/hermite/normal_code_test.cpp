@@ -113,9 +113,9 @@ TYPED_TEST(RoundingNormalCodes, NegateToCodesThatArePacked) {
     ASSERT_TRUE(packed_codes<TypeParam>().contains(TypeParam::negate(code))) << code;
 }
 
-/// The codes that floor reconstruct a component that was zero as one that is not, so that its lost sign
-/// matters; and the octahedral map rounds some normals of the plane z = 0 into the lower half, and their
-/// opposites, too.
+/// The codes that floor reconstruct a component that was zero as one that is not, so its lost sign matters;
+/// and the octahedral map rounds some normals of the plane z = 0 into the lower half, and their opposites,
+/// too.
 template <class Code>
 bool keeps_signs(const Normal& n) {
   if (kFloors<Code>) return n[0] != 0.0f && n[1] != 0.0f && n[2] != 0.0f;

@@ -143,9 +143,9 @@ struct ThesisNormalCode : octant_slots::FlooredNormalCode<127> {
 };
 
 /// The code of the article that the thesis cites (R. Baptista, Higher Accuracy Quantized Normals, GameDev.net
-/// 2000). The third component is 126 - a - b, so that the three add up to the sum that they were scaled to;
-/// it is still 0 to 2 too large. 64 contents of the slots, none of which is ever packed, have a third
-/// component of -1.
+/// 2000). The third component is 126 - a - b, so the three add up to the sum that they were scaled to; it is
+/// still 0 to 2 too large. 64 contents of the slots, none of which is ever packed, have a third component of
+/// -1.
 struct BaptistaNormalCode : octant_slots::FlooredNormalCode<126> {
   static constexpr const char* name = "baptista";
 };

@@ -1,4 +1,4 @@
-// Samplers: where Hermite data comes from (Aldén 2011, §2.8 and §5.2).
+// Samplers, the sources of Hermite data (Aldén 2011, §2.8 and §5.2).
 #pragma once
 
 #include <array>
@@ -28,9 +28,9 @@ PackedHermite sample_level_set_packed(const LevelSet& level_set, double isovalue
 struct PolygonSampling {
   std::size_t exact = 0;  ///< edges with the hit of a polygon
   std::size_t nearest =
-      0;  ///< edges without a hit, due to a sample of another sign; they have the nearest polygon's plane
+      0;  ///< edges without a hit, as a sample has a different sign; with the nearest polygon's plane
   std::size_t fallback =
-      0;  ///< edges without a polygon within a voxel that faces the right way; from the level set
+      0;  ///< edges without a polygon of the right orientation within a voxel; from the level set
   std::size_t ambiguous = 0;  ///< exact edges with several hits, of which one was chosen
 };
 

@@ -17,7 +17,7 @@ namespace hermesh {
 namespace {
 
 /// Returns a copy of the grid in which zeros are replaced by the least positive number. A sample at 0 is
-/// outside, so it has to be inside of the complement, and negation alone would leave it outside.
+/// outside, so it has to be inside of the complement, and mere negation would leave it outside.
 openvdb::FloatGrid::Ptr without_zeros(const openvdb::FloatGrid& grid) {
   const openvdb::FloatGrid::Ptr result = grid.deepCopy();
   for (auto value = result->beginValueAll(); value; ++value)

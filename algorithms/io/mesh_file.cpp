@@ -334,7 +334,7 @@ MeshFile to_mesh_file(const PolygonMesh& mesh) {
   file.triangles = mesh.triangles;
   file.quads = mesh.quads;
   file.attributes = mesh.attributes;
-  // Left out only at 0, if a reader would choose it by itself.
+  // Left out only at 0, if a reader would choose it by default.
   if (mesh.origin != choose_origin(bounds(mesh)) || mesh.origin != Eigen::Vector3d::Zero())
     file.origin = mesh.origin;
   return file;

@@ -37,9 +37,8 @@ struct MeshFile {
 
 /// Attributes are read on request only, since they take time and memory:
 /// - PLY vertices: nx ny nz as "normal"; red green blue [alpha] as "colour" of 3 or 4 components, whole
-/// numbers
-///   scaled to 0 … 1; u v, s t or texture_u texture_v as "uv"; any other number by its name, whole numbers as
-///   such.
+///   numbers scaled to 0 … 1; u v, s t or texture_u texture_v as "uv"; any other number by its name, integers
+///   as such.
 /// - PLY faces: the same, and a list texcoord or texture_uv as "uv" of corners.
 /// - OBJ: vn as "normal" and the first two numbers of vt as "uv" of corners; r g b behind the coordinates of
 /// a
@@ -48,10 +47,10 @@ struct MeshFile {
 ///
 /// The pieces of a cut polygon keep the values of its corners and its own; a dropped polygon drops its
 /// values. Degenerate polygons and points that no polygon uses keep theirs; nothing is merged in these
-/// formats. If only some elements have a value, the others get 0, or −1 among whole numbers, with a note. A
-/// name that is taken gets the domain in front ("polygon-quality"). An attribute that cannot be read is left
-/// out with a note: one with a value that is not a number, not finite or, among whole numbers, beyond 32
-/// bits, with an index out of range, or with a list of another length than the polygon.
+/// formats. If only some elements have a value, the others get 0, or −1 for integers, with a note. A name
+/// that is taken gets the domain in front ("polygon-quality"). An attribute that cannot be read is left out
+/// with a note: one with a value that is not a number, not finite or, for integers, beyond 32 bits, with an
+/// index out of range, or with a list of another length than the polygon.
 struct ReadOptions {
   bool attributes = false;
   std::vector<std::string> required = {};  ///< attributes for which it is an Error that they cannot be read

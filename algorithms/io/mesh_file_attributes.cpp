@@ -130,7 +130,7 @@ void AttributeTable::set(std::size_t column, int component, double value) {
   const auto newest = [&](auto& values) { return values.end() - attribute.components + component; };
   if (auto* whole = std::get_if<std::vector<std::int32_t>>(&attribute.values)) {
     using Limits = std::numeric_limits<std::int32_t>;
-    // Negated to refuse NaN, too, whose conversion to an integer is undefined.
+    // Negated to also reject NaN, whose conversion to an integer is undefined.
     if (!(value >= Limits::min() && value <= Limits::max()))
       return spoil_value(column, "does not fit into 32 bits with a sign");
     *newest(*whole) = static_cast<std::int32_t>(value);

@@ -76,8 +76,8 @@ class AttributeTable {
   void reserve(AttributeDomain domain, std::size_t elements);
   /// Begins the next element of the domain, with values as in add() until set() replaces them.
   void begin(AttributeDomain domain);
-  /// Sets a component of the newest element. A value that is not finite, or a whole number beyond 32 bits,
-  /// spoils the column.
+  /// Sets a component of the newest element. A value that is not finite, or an integer beyond 32 bits, spoils
+  /// the column.
   void set(std::size_t column, int component, double value);
   /// Marks a column that cannot be read and will be left out; the first reason counts.
   void spoil(std::size_t column, const std::string& reason);
@@ -145,7 +145,7 @@ class MeshBuilder {
     context_.progress("read", total ? static_cast<double>(done) / static_cast<double>(total) : 0.0);
   }
   /// Adds a polygon of any number of corners, which count from 0 and may name later points. @throws Error for
-  /// a corner that is no index of 32 bits.
+  /// a corner that is not a 32-bit index.
   void add_polygon(std::span<const std::int64_t> corners);
   /// Takes the origin from a comment `origin x y z`; any other text is ignored.
   void add_comment(std::string_view text);

@@ -48,7 +48,7 @@ class OffReader {
   /// so has this one.
   void skip_edge_count() {
     if (cursor_.rest_of_line().find_first_not_of(" \t\r,") != std::string_view::npos) return;
-    // A line of one whole number is the number of edges, since the line of a point has three numbers.
+    // A line of one integer is the number of edges, since the line of a point has three numbers.
     TextCursor ahead = cursor_;
     ahead.skip_to_word([](std::string_view) {});
     const std::string_view line = without_padding(ahead.rest_of_line());
@@ -122,7 +122,7 @@ class BinaryOffReader {
       if (!has(size)) return false;
       if (builder) {
         corners.resize(size);
-        // Signed, so that a corner −1 is refused rather than taken for the last of four billion.
+        // Signed, so that a corner −1 is rejected rather than read as the last of four billion.
         for (std::int64_t& corner : corners) corner = static_cast<std::int32_t>(word());
         builder->tick(at_, bytes_.size());
         builder->add_polygon(corners);

@@ -44,7 +44,7 @@ struct PlyHeader {
 struct Group {
   const char* attribute;
   std::vector<std::string_view> properties;
-  bool to_unit = false;  ///< whole numbers count from 0 to the largest of their type
+  bool to_unit = false;  ///< integers are scaled from 0 to the largest of their type
 };
 
 /// Finds the properties of a group, or none if one is missing or taken by another group.

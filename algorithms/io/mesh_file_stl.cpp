@@ -88,7 +88,7 @@ class StlReader {
       builder_.fail("the file is truncated: it has ", bytes_.size(),
                     " bytes, but a binary STL file of its declared number of triangles has ",
                     header_size + triangle_size * declared);
-    // The rest, no whole number of triangles, may only be padding.
+    // The rest, not a multiple of a triangle's size, may only be padding.
     const std::string_view rest = bytes_.substr(header_size + triangle_size * declared);
     if (!without_padding(rest).empty())
       builder_.fail("it declares ", declared, " triangles, but ", rest.size(),

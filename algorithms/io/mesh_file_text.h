@@ -17,7 +17,7 @@ inline std::string in_quotes(std::string_view text) { return "'" + std::string(t
 /// Returns a word of a file for a message: in quotation marks, short, with '?' for all that is not printable
 /// ASCII, so that no file can control the terminal.
 std::string quoted_word(std::string_view word);
-/// Returns the name with '?' in place of control characters, cut to 100 bytes.
+/// Returns the name with '?' instead of control characters, cut to 100 bytes.
 std::string clean_name(std::string_view name);
 inline std::string lower_case(std::string text) {
   for (char& c : text)

@@ -109,7 +109,7 @@ void check_transform(const openvdb::math::Transform& transform, const std::strin
   const openvdb::Vec3d size = transform.voxelSize();
   for (int axis = 0; axis < 3; ++axis)
     if (!(std::isfinite(size[axis]) && size[axis] > 0.0)) fail();
-  if (!transform.isLinear()) return;  // its inverse is made of it
+  if (!transform.isLinear()) return;  // its inverse is computed from it
   // Forth and back by the stored inverse, from the origin, far out along each axis and off the axes.
   for (const openvdb::Vec3d index :
        {openvdb::Vec3d(0, 0, 0), openvdb::Vec3d(100, 0, 0), openvdb::Vec3d(0, 100, 0),

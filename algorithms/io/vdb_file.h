@@ -27,7 +27,7 @@ void write_level_set(const std::filesystem::path& path, const LevelSet& level_se
 /// Description of a grid in a file.
 struct GridSummary {
   std::string name, value_type, grid_class;
-  bool is_read = true;  ///< false for types whose trees are skipped (points), so that voxels are unknown
+  bool is_read = true;  ///< false for types whose trees are skipped (points), so voxels are unknown
   std::uint64_t active_voxels = 0, memory_bytes = 0;
   std::array<int, 3> lower{}, upper{};  ///< active box, index space, inclusive
   std::array<double, 3> voxel_size{};   ///< along each index axis, world units

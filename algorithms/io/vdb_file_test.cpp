@@ -197,8 +197,7 @@ TEST_F(VdbFile, GridsThatShareATreeAndStreamsAreRead) {
   EXPECT_EQ(read("stream.vdb").active_voxels(), 7u);
 }
 
-/// Grids of points have leaves of another structure; OpenVDB knows the type, so that they can be stepped
-/// over.
+/// Grids of points have leaves of another structure; OpenVDB knows the type, so they can be stepped over.
 TEST_F(VdbFile, GridsOfOtherTypesAreDescribedAndNotRead) {
   const std::string type = "Tree_float_5_4_3", other = "Tree_ptidx32_5_4_3";
   write_plain("p.vdb", {ramp().grid().grid});

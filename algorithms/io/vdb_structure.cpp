@@ -163,7 +163,7 @@ class TreeWalk {
         if (index % kUpperDim != 0 || index < -kLargestIndex - kUpperDim || index > kLargestIndex)
           file_.damaged("a node has an impossible origin");
       box.expand(lower);
-      // The number of samples across must be a whole number of 32 bits, too.
+      // The number of samples across must also be a 32-bit integer.
       for (int axis = 0; axis < 3; ++axis)
         if (std::int64_t{box.max()[axis]} - box.min()[axis] > 2LL * kLargestIndex - 2 * kUpperDim)
           file_.damaged("its nodes lie too far apart");

@@ -33,8 +33,8 @@ constexpr std::size_t kLeavesAhead = 16, kSamplesAhead = 4;
 
 /// Most pairs of blocks that may change their sign where neither holds samples. A few bytes of a damaged file
 /// can describe a surface of any size; extractors need about 15 kB for the 64 edges of a pair (leaves, their
-/// copies, a crossing and a polygon each), so that this is a gibibyte. Level sets have none, and a cube that
-/// is one tile reaches it at a width of 864 voxels.
+/// copies, a crossing and a polygon each), so this is a gibibyte. Level sets have none, and a cube that is
+/// one tile reaches it at a width of 864 voxels.
 constexpr double kMostTilePairs = 70e3;
 
 /// Calls f(own, there, axis, width) for squares of blocks of the tile's faces across an axis that border a
@@ -108,8 +108,8 @@ std::vector<Coord> tiles_between_signs(const openvdb::FloatTree& tree, const Ins
   it.setMaxDepth(openvdb::FloatTree::ValueAllCIter::LEAF_DEPTH - 1);
   for (; it; ++it)
     if (is_inside(*it) != background) tiles.push_back(it.getBoundingBox());
-  // Counted before anything is listed: a damaged file is refused before it takes memory. Only the side unlike
-  // the background is traversed, so that each pair is counted once.
+  // Counted before anything is listed: a damaged file is rejected before it takes memory. Only the side
+  // unlike the background is traversed, so that each pair is counted once.
   std::vector<double> pairs(tiles.size());
   const auto bordering = [&](std::size_t i, auto&& f) {
     for_each_bordering_tile(

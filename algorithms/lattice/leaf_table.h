@@ -37,7 +37,7 @@ class LeafPlaces {
 
   std::size_t size() const { return leaves_.size(); }
   const InsideRule& rule() const { return rule_; }
-  /// The volume's tree, or the copy that a LeafTable made of it.
+  /// The volume's tree, or the copy of it that a LeafTable made.
   const openvdb::FloatTree& tree() const { return *tree_; }
   float background() const;
   /// Returns the tree's value, or its state, at coordinates relative to the first sample of `leaf`, in a leaf
@@ -46,8 +46,8 @@ class LeafPlaces {
   bool is_active_at(std::size_t leaf, int x, int y, int z) const;
 
   /// Returns the 512 samples of a leaf, in the order of BlockMask. `leaf` may also be a value of neighbour()
-  /// without a leaf: then all samples are +infinity, both inside and outside, so that no sign may be read
-  /// from them.
+  /// without a leaf: then all samples are +infinity, both inside and outside, so no sign may be read from
+  /// them.
   const float* values(std::int64_t leaf) const { return values_[static_cast<std::size_t>(leaf + kUniforms)]; }
   /// Returns the active samples: in a level set, those of the band.
   BlockMask active(std::size_t leaf) const;

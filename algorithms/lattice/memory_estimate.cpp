@@ -21,8 +21,8 @@ namespace {
 
 /// Bytes of a float leaf of 8³ voxels with its masks, and of the nodes of 16³ and 32³ children above it.
 constexpr double kLeafBytes = 2152.0, kMiddleBytes = 33.8e3, kUpperBytes = 270e3;
-/// OpenVDB's meshToVolume stores a closest-polygon index beside each distance, and dilated copies of both:
-/// 3.2 to 3.5 times the finished grid, measured on four meshes at three resolutions each.
+/// OpenVDB's meshToVolume stores a closest-polygon index with each distance, and dilated copies of both: 3.2
+/// to 3.5 times the finished grid, measured on four meshes at three resolutions each.
 constexpr double kPeakOverGrid = 3.5;
 /// OpenVDB's scale maps refuse a determinant below 3e-15, which is a voxel of 1.4423e-5.
 constexpr double kSmallestVoxel = 1.4423e-5;

@@ -25,7 +25,7 @@ bool read_leaf(const float* values, const InsideRule& rule, std::uint64_t* insid
     std::uint64_t bits = 0;
     for (int i = 0; i < 64; i += kLanes) {
       const Floats v = load(values + 64 * word + i);
-      // Comparisons are ordered: NaN counts as outside here, and the leaf is refused for it.
+      // Comparisons are ordered: NaN counts as outside here, and the leaf is rejected because of it.
       bits |= std::uint64_t{rule.scale > 0 ? less(v, iso) : less(iso, v)} << i;
       const Ints size = (Ints)v & kMagnitude;
       greatest = greatest > size ? greatest : size;

@@ -14,7 +14,7 @@ namespace hermesh {
 
 /// The shift, in voxels. It is far above the tolerance of the crossing test (1e-9) and the rounding of
 /// coordinates, far below anything visible in a distance, and its components are in no ratio of small
-/// integers, so that no polygon through samples at small slopes contains the shifted ones, too.
+/// integers, so no polygon through samples at small slopes contains the shifted ones, too.
 inline constexpr std::array<double, 3> kSideShift = {3.1415927e-6, 2.2182818e-6, 1.2020569e-6};
 
 /// Returns the position whose side sample (x, y, z) has, in voxels.

@@ -409,7 +409,8 @@ class BoundedRemesher {
     return far;
   }
 
-  /// Compares the mesh with the surface, both ways. Returns positions where the error may be exceeded.
+  /// Compares the mesh with the surface in both directions. Returns positions where the error may be
+  /// exceeded.
   std::vector<Far> prove(const Attempt& now, const SurfaceDistance& surface, const CertifiedMesh& coarse) {
     const Stage stage(context_, "prove");
     const std::vector<Eigen::Vector3f> points = now.in_file(coarse.points);

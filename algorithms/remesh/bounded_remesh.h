@@ -9,12 +9,12 @@
 //
 // **The method.** Large voxels, whose uniform mesh uses up almost nothing of the error on plane or smooth
 // shapes, are tried first, because a try costs little compared with the next. Otherwise voxels are made
-// smaller until the uniform mesh is within most of the error both ways at the vertices of both, and within
-// the error between these, triangle by triangle. The rest of the error at each position, minus a little, is
-// the tolerance of the collapses there (certified_collapse/). The result is then compared with the surface in
-// the same way: this, and nothing before it, is the proof (two_sided_proof.h). Where it fails, the tolerance
-// is lowered, or else the voxels are made smaller (voxel_size.h). The result is collapsed and proved again,
-// as long as that is worth it.
+// smaller until the uniform mesh is within most of the error in both directions at the vertices of both, and
+// within the error between these, triangle by triangle. The rest of the error at each position, minus a
+// little, is the tolerance of the collapses there (certified_collapse/). The result is then compared with the
+// surface in the same way: this, and nothing before it, is the proof (two_sided_proof.h). Where it fails, the
+// tolerance is lowered, or else the voxels are made smaller (voxel_size.h). The result is collapsed and
+// proved again, as long as that is worth it.
 #pragma once
 
 #include <Eigen/Core>
@@ -63,7 +63,7 @@ struct UnmetPlace {
 struct BoundedMesh {
   PolygonMesh mesh;    ///< closed, manifold, oriented, free of self-intersection; empty if `unmet` is not
   double error = 0.0;  ///< as requested
-  double to_surface = 0.0, from_surface = 0.0;  ///< proved bounds of the distance, each way
+  double to_surface = 0.0, from_surface = 0.0;  ///< proved bounds of the distance, one per direction
   double voxel_size = 0.0;
   int rounds = 0;              ///< number of times that voxels or tolerances were lowered
   double free_area = 0.0;      ///< area of polygons far from the mesh that bound nothing

@@ -217,8 +217,7 @@ TEST(BoundedRemesh, AFinIsRefusedAtOnceWithItsThickness) {
   EXPECT_EQ(refused.unmet.front().why, Unmet::thin);
   const Vector3d at = refused.unmet.front().place;
   EXPECT_GT(at.z(), 1.05);
-  // The sides are planes, so that the fin thins out evenly from the middle of its foot to its ends and its
-  // tip.
+  // The sides are planes, so the fin thins out evenly from the middle of its foot to its ends and its tip.
   EXPECT_NEAR(refused.thickness, 2e-4 * (2.0 * std::min(at.x(), 1.0 - at.x()) - (at.z() - 1.0) / 0.5), 1e-6);
   EXPECT_EQ(refused.rounds, 0);
 }

@@ -25,7 +25,7 @@ constexpr double kPointsOfPlane = 1e5;
 /// Work that a try counts for if it throws.
 constexpr double kWorkOfFailure = 3e5;
 
-/// Runs tries and stores the best mesh, with the notes and figures of its run.
+/// Runs tries and stores the best mesh, with the notes and statistics of its run.
 class Tries {
  public:
   Tries(const PolygonMesh& mesh, std::size_t triangles, RunContext& context)
@@ -125,7 +125,7 @@ BoundedMesh remesh_to_budget(const PolygonMesh& mesh, std::size_t triangles,
   const double extent = bounds(mesh).size().norm();
   const double exact = std::min(kExact, 3.0 / double(triangles)) * extent;
   // On a smooth surface the number of triangles is inversely proportional to the error; a sphere at 0.01 of
-  // the extent needs some hundreds.
+  // the extent needs several hundred.
   BoundedRemeshOptions now = options;
   now.error = std::clamp(3.0 * extent / double(triangles), 1e-5 * extent, 0.1 * extent);
   double too_small = 0.0, enough = std::numeric_limits<double>::infinity();

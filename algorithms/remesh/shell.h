@@ -1,7 +1,7 @@
 // Shells around triangles: all points within a radius of them, joined to a solid with exact Hermite data.
 //
 // **Why a shell has no holes.** Let every triangle have a radius of at least half a voxel. Where a lattice
-// edge crosses a triangle, the crossing divides the edge, which is one voxel long, so that one of its ends is
+// edge crosses a triangle, the crossing divides the edge, which is one voxel long, so one of its ends is
 // within half a voxel of the triangle and lies inside the shell. Two samples on different sides of the
 // polygons, both outside the shell, are therefore never neighbours along an edge: the shell separates them
 // (compare Huang, Yagel, Filippov and Kurzion, An Accurate Method for Voxelizing Polygon Meshes, 1998). The

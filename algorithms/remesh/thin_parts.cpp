@@ -155,7 +155,7 @@ class Thickening {
     return result;
   }
 
-  /// The triangles in parts, because the boxes of large triangles meet many rays.
+  /// The triangles in parts, because the boxes of large triangles intersect many rays.
   struct Parts {
     std::vector<Eigen::Vector3f> points;
     std::vector<Triangle> triangles;
@@ -181,7 +181,7 @@ class Thickening {
     return parts;
   }
 
-  /// Returns 1 or −1, the factor that turns the normal of a triangle outwards.
+  /// Returns 1 or −1, the factor that makes the normal of a triangle point outwards.
   double turn(std::uint32_t triangle) const { return orientation_.turns[triangle] < 0 ? -1.0 : 1.0; }
 
   /// Returns true if the solid is thick on one side of a piece. Both sides are tested, because the

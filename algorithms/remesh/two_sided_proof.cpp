@@ -93,7 +93,7 @@ TwoSidedDistance TwoSidedProof::compare(std::span<const Eigen::Vector3f> points,
   return result;
 }
 
-/// Returns SurfaceDistance::hold() with the smallest limit, to some hundredths of the error, that holds and
+/// Returns SurfaceDistance::hold() with the smallest limit, to a few hundredths of the error, that holds and
 /// is at most the error.
 DistanceFromSurface TwoSidedProof::smallest_bound(const SurfaceDistance& to,
                                                   std::span<const Eigen::Vector3f> points,

@@ -1,5 +1,5 @@
-// The surface that the bound of a remeshing is about, and the proof that a mesh is within an error of it,
-// both ways.
+// The surface that the bound of a remeshing is about, and the proof that a mesh is within an error of it, in
+// both directions.
 #pragma once
 
 #include <Eigen/Core>
@@ -29,7 +29,7 @@ struct SolidSurface {
 
 /// Returns the polygons' surface as a voxelization found it.
 /// @param boundary relative to the mesh's origin, with the caps of holes
-/// @param turns those of orient_faces(), or empty; faces that it omits are no part of the surface
+/// @param turns those of orient_faces(), or empty; faces that it omits are not part of the surface
 /// @param over_holes true if the caps are part of the surface
 SolidSurface surface_of(BoundaryTriangles boundary, std::span<const std::int8_t> turns, bool over_holes);
 
@@ -67,7 +67,8 @@ class TwoSidedProof {
 
   /// Compares a mesh with the surface. `points` are relative to a position that is `offset` from the
   /// polygons' origin; `to` and `from` measure the distances to the surface and to the mesh. With
-  /// Wanted::any_bound the bounds are at most the error; otherwise they are small, to some hundredths of it.
+  /// Wanted::any_bound the bounds are at most the error; otherwise they are minimal, to a few hundredths of
+  /// it.
   /// @throws Cancelled
   TwoSidedDistance compare(std::span<const Eigen::Vector3f> points, const std::vector<Triangle>& triangles,
                            const Eigen::Vector3d& offset, const SolidSurface& surface,

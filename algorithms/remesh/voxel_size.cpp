@@ -38,7 +38,7 @@ double width_at(const TriangleTree& tree, std::uint32_t triangle, const Eigen::V
   const Eigen::Vector3d reach = most * normal.cwiseAbs();
   tree.for_each_near(from - reach, from + reach, [&](std::uint32_t other) {
     const Eigen::Vector3d a = tree.corner(other, 0), b = tree.corner(other, 1), c = tree.corner(other, 2);
-    // Neighbours are no opposite wall, except the other side of a fin, folded over along an edge.
+    // Neighbours are not an opposite wall, except the other side of a fin, folded over along an edge.
     const bool folded = (b - a).cross(c - a).normalized().dot(normal) < kFolded;
     for (const Eigen::Vector3d& p : corner)
       if ((p == a || p == b || p == c) && !folded) return;

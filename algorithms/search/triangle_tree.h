@@ -26,7 +26,7 @@ struct NearestTriangle {
 /// level above. So there are no links, and the tree is the same for every number of threads. Points and boxes
 /// are single precision in the caller's units; index space is point * scale, rounded once to double
 /// precision, so that a scaled box contains its scaled points exactly. The tree refers to the caller's
-/// arrays, which have to outlive it. It takes about 8 bytes a triangle, and 16 more during construction.
+/// arrays, which have to outlive it. It takes about 8 bytes per triangle, and 16 more during construction.
 class TriangleTree {
  public:
   static constexpr std::uint32_t kNone = std::numeric_limits<std::uint32_t>::max();
@@ -54,7 +54,7 @@ class TriangleTree {
                           double upper_bound_squared = std::numeric_limits<double>::infinity(),
                           double enough_squared = -1.0) const;
 
-  /// Calls f(triangle) for the triangles whose boxes meet the box from `low` to `high` (index space).
+  /// Calls f(triangle) for the triangles whose boxes overlap the box from `low` to `high` (index space).
   template <class F>
   void for_each_near(const Eigen::Vector3d& low, const Eigen::Vector3d& high, F&& f) const {
     visit(
@@ -64,8 +64,8 @@ class TriangleTree {
         f);
   }
 
-  /// Calls f(triangle) for the triangles whose boxes the segment meets (index space), and for some that it
-  /// misses by 1e-6 voxels.
+  /// Calls f(triangle) for the triangles whose boxes the segment intersects (index space), and for some that
+  /// it misses by 1e-6 voxels.
   template <class F>
   void for_each_on_segment(const Eigen::Vector3d& from, const Eigen::Vector3d& to, F&& f) const {
     constexpr double kMargin = 1e-6;

@@ -223,7 +223,7 @@ class InTurn {
     hand_over_(std::move(piece));
   }
 
-  /// Meshes a piece by itself, by chapter 6: along a boundary its points may differ from those of the next
+  /// Meshes a piece separately, by chapter 6: along a boundary its points may differ from those of the next
   /// piece.
   PolygonMesh meshed(const Data& piece) {
     return adaptive_dual_contouring(piece, {.threshold = threshold_}, nullptr, meshing_);

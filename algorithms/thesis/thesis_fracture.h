@@ -10,10 +10,10 @@
 //
 // Both sides of a cut have the same crossings on the same edges. But along a boundary a cell holds, for each
 // piece, other crossings (the original surface's on one side of the cut only, those of a later cutter in one
-// piece only), so that the pieces' points differ there, and the volumes do not add up. Eq. 7.1 leaves data
-// between samples of one sign where a cut runs close to the surface, and the whole wall where two cutters
-// share one (trap T11); these become polygons that bound nothing. 10 bytes lose some data (trap T2), which
-// leaves holes. fracture.h has the method that repairs all of it.
+// piece only), so the pieces' points differ there, and the volumes do not add up. Eq. 7.1 leaves data between
+// samples of one sign where a cut runs close to the surface, and the whole wall where two cutters share one
+// (trap T11); these become polygons that bound nothing. 10 bytes lose some data (trap T2), which leaves
+// holes. fracture.h has the method that repairs all of it.
 //
 // Readings of gaps in the text (paper/readings.md, R33 to R37):
 //   - Planes and Voronoi cells are made into solids code by code, each closed by a box around the object. As

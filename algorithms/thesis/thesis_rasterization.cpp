@@ -43,7 +43,7 @@ void for_each_batch(const GridTriangle& t, std::vector<Voxel>& voxels, F&& visit
     for (const Eigen::Vector3d& corner : t) put(nearest_voxel(corner));
   else
     // Segment i runs at barycentric weight i/n off the first corner. In double precision a sum of three
-    // products, so that halves may round either way (see rasterize_by_samples()).
+    // products, so halves may round either way (see rasterize_by_samples()).
     for (std::int64_t i = 0; i <= n; ++i) {
       for (std::int64_t j = 0; j <= i; ++j)
         put(nearest_voxel((double(n - i) * t[0] + double(i - j) * t[1] + double(j) * t[2]) / double(n)));

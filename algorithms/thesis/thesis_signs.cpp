@@ -130,7 +130,7 @@ struct BoundarySigns {
   }
 
   /// Evaluates the boundary voxels of a block by the marks of the flood fill. The results are stored in
-  /// `found_outside`, so that no voxel depends on another's.
+  /// `found_outside`, so no voxel depends on another's.
   void evaluate(BandBlock& block) const {
     block.found_outside = {};
     for_each_bit(block.boundary, [&](int sample) {

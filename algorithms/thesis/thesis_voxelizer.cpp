@@ -179,7 +179,7 @@ ThesisVoxelizerOptions thesis_voxelizer_options(const Options& options) {
 Voxelization thesis_voxelization(const VoxelizationInput& input, const ThesisVoxelizerOptions& options,
                                  bool nearest) {
   check_voxelization_fits(input.mesh, input.voxel_size, input.exterior_band, input.interior_band);
-  // A negation, so that NaN is refused, too.
+  // A negation, so that NaN is also rejected.
   if (!(options.sign_angle > 0.0 && options.sign_angle <= 180.0))
     throw Error("The sign angle must be above 0 and at most 180 degrees, not " +
                 std::to_string(options.sign_angle) + ".");

@@ -330,10 +330,10 @@ TEST(ThesisVoxelizer, WithoutCleanUpVoxelsOfSelfIntersectionsStay) {
     gone += clean->tree().isValueOn(xyz) && !kept->tree().isValueOn(xyz) ? 1 : 0;
   });
   EXPECT_GT(deep, 1000u);
-  // The expansion rests on other neighbours, so that single voxels at the band's end are not found.
+  // The expansion rests on other neighbours, so single voxels at the band's end are not found.
   EXPECT_LT(gone, 30u);
   EXPECT_GT(kept->activeVoxelCount(), clean->activeVoxelCount());
-  // A mesh that does not meet itself has next to nothing to remove.
+  // A mesh that does not intersect itself has almost nothing to remove.
   const PolygonMesh single = sphere(20.0, 5);
   EXPECT_TRUE(same(*voxelize(single, 1.0), *voxelize(single, 1.0, {.clean_up = false})));
 }

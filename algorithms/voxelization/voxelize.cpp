@@ -107,7 +107,7 @@ void add_caps(Signs& signs, double voxel_size, double reach, const BlockTable& t
 }
 
 /// Replaces the distances of the leaf's voxels inside by those of `other`. Voxels outside keep theirs: every
-/// path from outside to an interior face crosses the solid's boundary first, so that the face is never the
+/// path from outside to an interior face crosses the solid's boundary first, so the face is never the
 /// nearest.
 void replace_inside(FloatLeaf& leaf, const FoundLeaf& other, const BlockMask& inside, float reach) {
   FloatLeaf::NodeMaskType mask = leaf.getValueMask();
@@ -136,7 +136,7 @@ InteriorFaces leave_out_interior_faces(const IndexSoup& soup, TriangleBins& bins
     for_each_bit(inside, [&](int v) { (*band.nearest[found.block])[v] = found.nearest[v]; });
   });
   if (sheets.pieces.triangles.empty()) return sheets;
-  // Then the outer pieces of the cut triangles are added again. They lie within their triangles, so that all
+  // Then the outer pieces of the cut triangles are added again. They lie within their triangles, so all
   // blocks within their reach are in `bins`.
   const IndexSoup pieces(sheets.pieces, work.voxel_size);
   TriangleBins piece_bins(pieces, work.reach, context);
@@ -176,8 +176,8 @@ openvdb::FloatGrid::Ptr assemble_distance(Band& band, const Widths& widths, bool
     if (leaf) grid->tree().addLeaf(leaf.release());
   grid->setName(is_signed ? "sdf" : "udf");
   if (!is_signed) return grid;
-  // The leaves are signed already, so that the fill starts above them (level 1): it gives tiles between
-  // leaves the sign and the width of their side.
+  // The leaves are signed already, so the fill starts above them (level 1): it gives tiles between leaves the
+  // sign and the width of their side.
   openvdb::tools::signedFloodFillWithValues(grid->tree(), widths.exterior, -widths.interior, true, 1, 1);
   grid->setGridClass(openvdb::GRID_LEVEL_SET);
   return grid;
@@ -281,7 +281,7 @@ Voxelization voxelize_within(const PolygonMesh& mesh, const VoxelizeOptions& opt
   return result;
 }
 
-// The caller has checked the value, so that any other value, or an input without options, is "auto".
+// The caller has checked the value, so any other value, or an input without options, is "auto".
 SignRule sign_rule(const Options& options) {
   if (options.is("signs", "flood-fill")) return SignRule::flood_fill;
   if (options.is("signs", "winding-number")) return SignRule::winding_number;

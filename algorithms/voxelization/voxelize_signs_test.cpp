@@ -93,7 +93,7 @@ TEST(VoxelizeSigns, AutomaticSignsCloseAHole) {
 
 /// Its samples have coordinates of both signs, which truncation towards 0 instead of down once confused.
 TEST(VoxelizeSigns, TheSurfaceAcrossAHoleDoesNotDependOnWhereTheHoleIs) {
-  // The border is a saddle's, so that the surface across is bent.
+  // The border is a saddle's, so the surface across is bent.
   PolygonMesh here = sphere({0, 0, 0}, 9.0, 48);
   std::erase_if(here.triangles, [&](const Triangle& t) {
     const Vector3f& p = here.points[t[0]];

@@ -62,7 +62,7 @@ TEST(Voxelize, ABandOfOneVoxelHasTheSignsOfFacesOnSamples) {
 }
 
 TEST(Voxelize, AnUnsignedBandOfOneVoxelIsNoWider) {
-  // Faces that cancel enclose nothing, so that by either rule no voxel has a sign.
+  // Faces that cancel enclose nothing, so by either rule no voxel has a sign.
   PolygonMesh sheet;
   add_triangle(sheet, {-9, -9, 0}, {9, -9, 0}, {0, 9, 0});
   append(sheet, PolygonMesh(sheet), true);
@@ -156,7 +156,7 @@ TEST(Voxelize, TurnedDoubledAndShuffledFacesChangeNothing) {
 }
 
 TEST(Voxelize, UnionOfOverlappingSpheres) {
-  // Every triangle twice, in random orientation; the truth is analytic but for the facets.
+  // Every triangle twice, in random orientation; the truth is analytic except for the facets.
   const double radius = 20.0, apart = 12.0;
   PolygonMesh mesh;
   append(mesh, sphere({-apart, 0, 0}, radius, 64));
@@ -415,8 +415,7 @@ void check_soups(int count, unsigned seed) {
   EXPECT_GT(checked, 50u * std::size_t(count));
 }
 
-/// Its corners are collinear except for rounding, so that its normal is noise, which must not lose either
-/// end.
+/// Its corners are collinear except for rounding, so its normal is noise, which must not lose either end.
 TEST(Voxelize, ANeedleHasTheBandAroundBothEnds) {
   PolygonMesh needle;
   needle.points = {{1.9281562566757202f, 0.71781373023986816f, 2.6251864433288574f},

@@ -1,6 +1,6 @@
 // Equation 7.1 of the thesis against the rule of signs: a model less a copy of itself that is moved aside.
-// Both results are meshed from the same 10 bytes by the same extraction, so that the rule alone differs:
-// eq. 7.1 combines the bytes, and the rule of signs combines the exact data, which are packed then.
+// Both results are meshed from the same 10 bytes by the same extraction, so only the rule differs: eq. 7.1
+// combines the bytes, and the rule of signs combines the exact data, which are packed then.
 
 #include "algorithms/hermite/combine.h"
 #include "algorithms/hermite/samplers.h"

@@ -149,7 +149,7 @@ TEST(ExactShapes, ValuesByHand) {
   EXPECT_NEAR(inner.mean_curvature, 0.5 * (1 / 0.3 - 1 / 0.4), 1e-12);
   // Beyond a corner of the cube of half side .6.
   EXPECT_NEAR(exact_shape("cube")->distance({1.6, 1.6, 1.6}), std::sqrt(3.0), 1e-12);
-  // Beyond the rim of the cylinder .8/.7 by 3 and 4.
+  // Beyond the circular edge of the cylinder, .8/.7 by 3 and 4.
   EXPECT_NEAR(exact_shape("cylinder")->distance({3.8, 0, 4.7}), 5.0, 1e-12);
   EXPECT_THROW(exact_shape("teapot"), Error);
 }
@@ -251,7 +251,7 @@ TEST(MeshErrors, OfACubeGrownByATenthAreThoseByHand) {
   for (Eigen::Vector3f& p : mesh.points) p *= 1.1f;
   const MeshErrors grown = mesh_errors(mesh, cube, 0.1, context);
   EXPECT_NEAR(*grown.signed_error(Quantity::kMax), 0.06 * std::sqrt(3.0), 1e-6);  // at the corners
-  EXPECT_NEAR(*grown.signed_error(Quantity::kCorners), 0.06, 1e-6);               // to the faces beside them
+  EXPECT_NEAR(*grown.signed_error(Quantity::kCorners), 0.06, 1e-6);               // to the faces next to them
   EXPECT_NEAR(*grown.signed_error(Quantity::kArea), 0.21, 1e-6);
   EXPECT_NEAR(*grown.signed_error(Quantity::kVolume), 0.331, 1e-6);
 }

@@ -336,8 +336,8 @@ class Gyroid final : public ExactShape {
   double distance(const Vector3d& p) const override {
     const double ball = p.norm() - kBall;
     const double g = value(p);
-    // The gradient is no longer than the bound, so that a large value is far away; its distance does not
-    // matter there.
+    // The gradient is no longer than the bound, so a large value is far away; its distance does not matter
+    // there.
     const double bound = std::abs(g) / kSteepest;
     double sheet = g < 0 ? -bound : bound;
     if (bound < kExact) {

@@ -91,7 +91,7 @@ class PlacedShape {
   Eigen::Isometry3d to_world_, to_shape_;
 };
 
-/// The shape turned by 20°, 30° and 40° about x, y and z, so that nothing lies along the lattice, and moved.
+/// The shape rotated by 20°, 30° and 40° about x, y and z, so that nothing is axis-aligned, and translated.
 PlacedShape turned(std::shared_ptr<const ExactShape> shape, const Eigen::Vector3d& move);
 
 }  // namespace hermesh

@@ -143,7 +143,7 @@ class OrderMeasurer {
       if (variant.takes_hermite) add(variant, "Hermite data", "");
       if (has_polygons && slow_) add(variant, "polygons", "hermesh");
     }
-    // Errors of a voxelizer are visible in any mesh of its level set alone.
+    // Errors of a voxelizer are visible in any mesh of only its level set.
     if (has_polygons && slow_)
       for (const MethodOfOrder& voxelizer : kVoxelizersOfOrder)
         if (voxelizer.label != "hermesh" && !voxelizer.slow)

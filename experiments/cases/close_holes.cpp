@@ -96,8 +96,7 @@ class LoopTriangulation {
   const PolygonMesh& mesh_;
   const std::vector<std::uint32_t>& loop_;
   std::size_t size_;
-  std::vector<double>
-      area_;  ///< smallest area between two corners of the loop, infinite where there is no way
+  std::vector<double> area_;  ///< smallest area between two corners of the loop, infinite if there is no path
   std::vector<std::size_t> apex_;
 };
 

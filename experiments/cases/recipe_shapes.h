@@ -28,7 +28,7 @@ class Random {
   std::uint64_t state_;
 };
 
-/// Gradient noise (Perlin, Improving Noise, SIGGRAPH 2002) with a hash in place of the permutation table.
+/// Gradient noise (Perlin, Improving Noise, SIGGRAPH 2002) with a hash instead of the permutation table.
 class GradientNoise {
  public:
   explicit GradientNoise(std::uint64_t seed) : seed_(seed * 0x9e3779b97f4a7c15u) {}

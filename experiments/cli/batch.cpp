@@ -105,7 +105,7 @@ Json result_of(const ChildRun& child, const BatchItem& item) {
           {"triangles", nullptr}, {"notes", Json::array()}};
 }
 
-/// Returns the message with the name of the input in front, unless it has it.
+/// Returns the message with the name of the input prepended, unless it already contains it.
 std::string about(const std::string& input, const Json& message) {
   const std::string text = message;
   return shown(text.find(input) == std::string::npos ? input + ": " + text : text, 1500, true);

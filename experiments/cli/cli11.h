@@ -30,8 +30,8 @@ inline CLI::Validator finite_number(double minimum = std::numeric_limits<double>
       "");
 }
 
-/// Accepts a whole number from `least` to `most` in any notation, such as 1000, 1e3 or 1000.0, and replaces
-/// it by its digits. For CLI::Option::transform(), because an integer option reads digits only.
+/// Accepts an integer from `least` to `most` in any notation, such as 1000, 1e3 or 1000.0, and replaces it by
+/// its digits. For CLI::Option::transform(), because an integer option reads digits only.
 inline CLI::Validator whole_number(std::int64_t least, std::int64_t most) {
   return CLI::Validator(
       [least, most](std::string& given) {

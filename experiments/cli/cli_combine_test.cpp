@@ -121,7 +121,7 @@ TEST_F(CombineTest, SolidsTooFarApartForOneMeshAreRefusedAndOthersKeepTheirShape
   const Outcome apart = run_to(1, "combine union a.off far.off out.ply --voxel-size 0.05");
   EXPECT_PRED2(has, apart.err, "voxel");
   EXPECT_FALSE(files().contains("out.ply"));
-  // 10,000 voxels apart; of the far one alone something is left.
+  // 10,000 voxels apart; only the far one has a part left.
   write_box("far.off", 500.0, 502.0);
   run_to(0, "combine union a.off far.off out.ply --voxel-size 0.05");
   EXPECT_NEAR(volume(), 16.0, 0.01);

@@ -18,7 +18,7 @@ namespace fs = std::filesystem;
 
 class DamageTest : public ProgramTest {
  protected:
-  /// A file that lies beside this one.
+  /// A file in the directory of this one.
   std::string input(const std::string& name) {
     const fs::path target = path(name);
     fs::copy_file(fs::path(HERMESH_TEST_INPUTS) / name, target);

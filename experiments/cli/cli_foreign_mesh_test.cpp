@@ -17,7 +17,7 @@ namespace cli_foreign_mesh_test {
 std::string foreign(const std::string& name) {
   const std::string file = std::string(HERMESH_FOREIGN_MESHES) + "/" + name;
   const bool packed = !std::filesystem::exists(file);
-  const gzFile in = gzopen((file + (packed ? ".gz" : "")).c_str(), "rb");  // reads plain files as they are
+  const gzFile in = gzopen((file + (packed ? ".gz" : "")).c_str(), "rb");  // also reads plain files
   if (!in) throw std::runtime_error("no file " + file);
   std::string bytes;
   char buffer[1 << 14];

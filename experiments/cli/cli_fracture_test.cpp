@@ -90,7 +90,7 @@ TEST_F(FractureTest, OtherMethods) {
   for (const char* method : {"thesis", "openvdb"}) {
     fracture(0, {"--cutters", "voronoi:4", "--method", method, "--no-picture"});
     EXPECT_GE(ledger().at("pieces").size(), 4u) << method;
-    // Eq. 7.1 leaves polygons that bound nothing, so that the printed pieces' volume means less.
+    // Eq. 7.1 leaves polygons that bound nothing, so the printed pieces' volume means less.
     EXPECT_NEAR(ledger().at("pieces_volume").get<double>(), 8.0,
                 method == std::string("openvdb") ? 0.2 : 0.8);
     std::filesystem::remove_all(path("out"));

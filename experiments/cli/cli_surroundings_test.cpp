@@ -129,7 +129,7 @@ TEST_F(SurroundingsTest, UnitsAreStatedWhereTheFormatHasThem) {
   for (const Words command : {"remesh box.off", "combine union box.off box.off"}) {
     run_to(0, command + "out.3mf --resolution 20 --units mm");
     const Json report = json_of("validate out.3mf --json");
-    // The reader takes the numbers as they are, and notes a unit other than the millimetre.
+    // The reader uses the numbers unchanged, and notes a unit other than the millimetre.
     EXPECT_NEAR(report.at("volume").get<double>(), 24e-9, 1e-11);
     EXPECT_PRED2(has, report.at("notes").dump(), "'meter'") << report.at("notes");
   }

@@ -300,7 +300,7 @@ TEST_F(CliTest, ThinPartsAreKeptDroppedOrRefused) {
 }
 
 TEST_F(CliTest, MuchThatIsLostIsNotMet) {
-  // A cube with a fin beside it that holds no sample.
+  // A cube with a fin next to it that contains no sample.
   write("fin.off",
         "OFF\n16 12 0\n0 0 0\n1 0 0\n1 1 0\n0 1 0\n0 0 1\n1 0 1\n1 1 1\n0 1 1\n"
         "0 0 1.53\n1 0 1.53\n1 1 1.53\n0 1 1.53\n0 0 1.56\n1 0 1.56\n1 1 1.56\n0 1 1.56\n"

@@ -79,7 +79,7 @@ int run_combine(CombineArguments& arguments, Session& session) {
   check_mesh_output(arguments.out);
   const PolygonMesh first = read_polygons(arguments.first, session);
   const PolygonMesh second = read_polygons(arguments.second, session);
-  // A resolution counts along the longer operand, so that the order of the two does not matter.
+  // A resolution counts along the longer operand, so the order of the two does not matter.
   const bool second_is_longer = bounds(second).size().maxCoeff() > bounds(first).size().maxCoeff();
   voxelizing.voxel_size = second_is_longer ? voxelizing.recipe(second, arguments.second).voxel_size
                                            : voxelizing.recipe(first, arguments.first).voxel_size;

@@ -49,7 +49,7 @@ auto chosen_from(const std::vector<Method>& table, const std::string& kind, cons
 void VoxelizeArguments::choose() {
   std::vector<std::string> all = options;
   if (signs) all.push_back("signs=" + *signs);
-  // Open sheets are kept if thin parts are.
+  // Open sheets are preserved if thin parts are.
   const bool has_signs = std::ranges::any_of(all, [](const auto& o) { return o.starts_with("signs="); });
   if (voxelizer == "hermesh" && !has_signs && thin.value_or("keep") == "keep")
     all.push_back("signs=auto-sheets");

@@ -31,7 +31,7 @@ struct VoxelizeArguments {
   /// Looks up the voxelizer and checks its options. @throws UsageError for an unknown name, option or value.
   void choose();
   /// Returns the requested treatment of thin parts, or to keep them if possible. @throws UsageError if they
-  /// cannot be kept although that was requested.
+  /// cannot be preserved although that was requested.
   ThinRule thin_rule(double isovalue = 0.0) const;
   /// Returns the input of the voxelizer, with the voxel size in world units.
   /// @throws Error if the mesh of `file` is smaller than a voxel, or if it has no extent and a resolution was

@@ -93,7 +93,7 @@ TEST_F(JsonReportTest, AFileThatEndsOtherwiseIsToldHowToBeNamed) {
 using OptionsTest = JsonReportTest;
 
 TEST_F(OptionsTest, ScaleIsAFactorToWorldUnits) {
-  // Halves are exact, so that the bytes of a file with halved numbers are those of the scaled one.
+  // Halves are exact, so the bytes of a file with halved numbers are those of the scaled one.
   write_cube();
   const std::string numbers[] = {"-1 -1 -1", "1 -1 -1", "1 1 -1", "-1 1 -1",
                                  "-1 -1 1",  "1 -1 1",  "1 1 1",  "-1 1 1"};

@@ -209,7 +209,7 @@ std::string misnamed_json_file(const std::vector<std::string>& words) {
 }
 
 /// Returns the arguments in the order that CLI11 expects, the last one first. The file of --json is attached
-/// to it, because a flag takes no separate value; no file that a command reads or writes has that ending.
+/// to it, because a flag takes no separate value; no file that a command reads or writes has that extension.
 std::vector<std::string> with_json_files(std::vector<std::string> words) {
   for (std::size_t i = 0; i + 1 < words.size(); ++i)
     if (words[i] == "--json" && (words[i + 1].ends_with(".json") || words[i + 1].ends_with(".jsonl"))) {

@@ -41,7 +41,7 @@ auto as_usage(Check check) {
 struct Session {
   RunContext context;
   bool quiet = false;
-  bool json = false;                            ///< prints one JSON object in place of summaries
+  bool json = false;                            ///< prints one JSON object instead of summaries
   std::string json_file;                        ///< file for that object; empty: none
   std::optional<int> threads;                   ///< number of threads; none: all of the machine
   std::string log_file;                         ///< empty: no log

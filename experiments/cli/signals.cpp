@@ -42,7 +42,7 @@ extern "C" void on_signal(int number) {
   errno = saved_errno;
 }
 
-/// Starts a process that shares this one's memory and files and outlives it. The system needs some tenths of
+/// Starts a process that shares this one's memory and files and outlives it. The system needs a few tenths of
 /// a second to free gigabytes, and a large file that was removed while it was open; it now does so after the
 /// end of this process, for which the user waits. (Pipes stay open until then.)
 void leave_memory_to_another_process() {

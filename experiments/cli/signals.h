@@ -16,7 +16,7 @@ const std::atomic<bool>& handle_signals();
 /// watchdog is ending the process.
 void work_is_finished() noexcept;
 
-/// While held, work_is_finished() does nothing, because the output has yet to be delivered.
+/// While such an object exists, work_is_finished() does nothing, because the output has yet to be delivered.
 void hold_the_end(bool held) noexcept;
 
 /// Returns the exit code for the received signal, 128 plus its number; 0 without one.

@@ -10,7 +10,7 @@ namespace hermesh::cli {
 
 /// Copies the standard input to a temporary file before the command runs, and the finished output to the
 /// standard output afterwards, if the command reads or writes "-". So a command sees only files, a truncated
-/// stream is refused like a truncated file, and a command that fails writes nothing. During the lifetime of
+/// stream is rejected like a truncated file, and a command that fails writes nothing. During the lifetime of
 /// the object everything that is printed goes to the standard error if the standard output is taken.
 class Streams {
  public:
@@ -36,14 +36,13 @@ class Streams {
   int standard_output_ = -1;
 };
 
-/// Opens /dev/null in place of each closed standard stream, so that no file or pipe gets its number. It is
+/// Opens /dev/null instead of each closed standard stream, so that no file or pipe gets its number. It is
 /// opened in the opposite direction, so that reading from the input and writing to the outputs fail as on a
 /// closed stream.
 void occupy_closed_streams() noexcept;
 
-/// Returns the name ending of the format that the unpacked first bytes of a mesh, a .vdb or a NIfTI file
-/// indicate, such as
-/// ".ply"; ".obj" if they indicate no other.
+/// Returns the file extension of the format that the unpacked first bytes of a mesh, a .vdb or a NIfTI file
+/// indicate, such as ".ply"; ".obj" if they indicate no other.
 std::string ending_of(std::string_view first_bytes);
 
 }  // namespace hermesh::cli

@@ -69,7 +69,7 @@ class Run {
     const std::vector<CutCode> codes =
         cutters_.meshes.empty() ? codes_within(object_.hermite, cutters, context_) : std::vector<CutCode>();
     handing_over_ += since(begun);
-    // A cutter that is no mesh is given as the polygons of its part of space; to make them is not OpenVDB's
+    // A cutter that is not a mesh is given as the polygons of its part of space; making them is not OpenVDB's
     // work.
     const auto polygons = [&](std::size_t k) {
       if (!cutters_.meshes.empty()) return cutters_.meshes[k].mesh;

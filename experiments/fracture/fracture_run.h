@@ -30,7 +30,7 @@ struct FractureMethod {
   /// openvdb: adaptivity, 0 to 1.
   double tolerance = 0.0;
   FractureOptions options;
-  ThesisFractureOptions::Rule rule = ThesisFractureOptions::Rule::printed;  ///< of the method thesis alone
+  ThesisFractureOptions::Rule rule = ThesisFractureOptions::Rule::printed;  ///< only of the method thesis
 };
 
 struct FractureSummary {
@@ -53,7 +53,7 @@ double reach_of_pieces(const FractureObject& object, const FractureMethod& metho
 FractureSummary run_fracture(const FractureObject& object, const MadeCutters& cutters,
                              const FractureMethod& method, const HandOver& hand_over, RunContext& context);
 
-/// Refuses a method that run_fracture() would refuse. @throws Error as that does.
+/// Checks the method. @throws Error if run_fracture() would reject it.
 void check_method(const FractureMethod& method);
 
 }  // namespace hermesh

@@ -184,7 +184,7 @@ TEST(FractureBytes, AreTheSameAtAnyThreadCountAndLevelOfVectorCode) {
     }
 }
 
-/// The books of a fracture of polygons, made as the program makes it by default.
+/// The volume balance of a fracture of polygons with the program's default options.
 validation::FractureReport ledger_of(const PolygonMesh& mesh, double longest, const std::string& cutters,
                                      std::uint64_t seed, RunContext& context, double tolerance = 0.0) {
   const LevelSet level_set =

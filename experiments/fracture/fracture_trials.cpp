@@ -23,7 +23,7 @@ class Assembly {
   explicit Assembly(std::uint64_t seed) : random_(static_cast<double>(seed)) {}
 
   double uniform(double low, double high) { return random_.uniform(low, high); }
-  /// A random whole number from `least` to `most`.
+  /// Returns a random integer from `least` to `most`.
   int whole(int least, int most) {
     return least + static_cast<int>(random_.bits() % static_cast<std::uint64_t>(most - least + 1));
   }

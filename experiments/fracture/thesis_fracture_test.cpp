@@ -57,8 +57,8 @@ TEST(FractureMethods, TheThesisLeavesGapsAndTheVolumeNearlyAddsUp) {
         EXPECT_NE(pieces.context.notes[0].find("bound nothing"), std::string::npos);
         continue;
       }
-      // Signs leave no data without a change of sign, and exact data lose none: each piece is closed, so that
-      // it has a volume.
+      // Signs leave no data without a change of sign, and exact data lose none: each piece is closed, so it
+      // has a volume.
       EXPECT_EQ(pieces.meshes.size(), 6u);
       EXPECT_NEAR(pieces.volume, 24.0 * 18.0 * 28.0, 0.01 * 24.0 * 18.0 * 28.0) << threshold;
       EXPECT_EQ(pieces.figure("lost_crossings") + pieces.figure("needless_crossings"), 0.0);

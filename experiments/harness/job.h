@@ -45,7 +45,7 @@ struct JudgedBy {
   std::string solid;  ///< case whose surface bounds the solid if the input's does not; empty: the input
 };
 
-/// A group of cells: an input at one voxel size, for all variants, which take turns while they are timed.
+/// A group of cells: an input at one voxel size, for all variants, whose runs are interleaved for timing.
 struct GroupJob {
   bool extraction = true;  ///< extractors compete, or else voxelizers
   Json head;               ///< the first keys of all rows

@@ -191,7 +191,7 @@ class Group {
     cell.row["disagreements"] = std::move(disagreements);
   }
 
-  /// Both ways; nothing where that mesh failed or was not asked for.
+  /// In both directions; nothing if that mesh failed or was not requested.
   void compare_with_uniform(const MeshFile& mesh, Cell& cell, RunContext& child) const {
     const auto other = std::ranges::find_if(
         cells_, [&](const Cell& each) { return each.row["variant"]["label"] == cell.uniform; });

@@ -156,8 +156,8 @@ constexpr const char* kOperations[] = {"pack, quotients as printed", "pack, one 
                                        "unpack, weight computed"};
 
 /// Counts the operations of one call, and the results that differ from those of the code in use. That code's
-/// own functions cannot be run on counted numbers: they work on the bits of floats, so that loops over them
-/// become vector code. The transcriptions above are compared with it.
+/// own functions cannot be run on counted numbers: they work on the bits of floats, so loops over them become
+/// vector code. The transcriptions above are compared with it.
 void count_operations(const MeasurementInput& input, std::vector<MeasuredRow>& rows) {
   const std::vector<Normal> normals = random_normals(200'000, input.seed);
   for (std::size_t which = 0; which < std::size(kOperations); ++which) {

@@ -74,7 +74,7 @@ std::string other_number(const OptionSpec& spec) {
   return spec.fallback;
 }
 
-/// Returns the defaults, and each option by itself at its other choices or at another number, with the
+/// Returns the defaults, and each option individually at its other choices or at another number, with the
 /// options that it requires.
 template <class Variant>
 std::vector<Given> variations(const Variant& variant) {

@@ -40,7 +40,7 @@ class Figure94Measurer {
   void measure(const std::string& name, double resolution) {
     input_.context.check();
     RunContext child = child_context(input_.context, false);
-    // One voxel of band on either side, as table 9.1's dimensions have it.
+    // One voxel of band on either side, as in the dimensions of table 9.1.
     const VoxelizeRecipe recipe{.chosen = choose(input_.tables.voxelizers, name),
                                 .resolution = resolution,
                                 .exterior_band = 1.5,

@@ -35,7 +35,7 @@ std::string label_of_method(const Method& method, std::size_t threads) {
   return method.label + (threads == 1 ? ", 1 thread" : ", all threads");
 }
 
-/// All methods at one resolution, in turns.
+/// All methods at one resolution, interleaved.
 std::vector<MeasuredRow> race_at(double resolution, const LoadedCase& model, const MeasurementInput& input,
                                  const std::vector<Method>& all, const std::vector<std::size_t>& counts) {
   const LevelSet level_set = voxelized(model.mesh, {.resolution = resolution}, input);

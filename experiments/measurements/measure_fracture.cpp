@@ -65,8 +65,8 @@ class FractureBooks {
   }
 
  private:
-  /// Returns the tolerances of a method (FractureMethod); OpenVDB's adaptivity is no tolerance, so it runs at
-  /// its finest.
+  /// Returns the tolerances of a method (FractureMethod); OpenVDB's adaptivity is not a tolerance, so it runs
+  /// at its finest.
   std::vector<double> tolerances_of(const std::string& method) const {
     if (method == "openvdb") return {0.0};
     return numbers_in(input_.parameters.text(method == "thesis" ? "thesis_tolerances" : "tolerances"));

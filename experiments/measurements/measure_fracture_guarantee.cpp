@@ -15,7 +15,7 @@ std::vector<std::string> fractured_cases(const std::string& choice) {
   if (choice == "few") return {"torus", "cad-part"};
   if (choice != "all") return {choice};
   const std::set<std::string> excluded = {
-      "thai-statue",     // its file is not in every data folder, and the stand-in has nine million triangles
+      "thai-statue",     // not in every data directory, and the stand-in has nine million triangles
       "all-degenerate",  // seven triangles without area enclose nothing that could be broken
   };
   std::vector<std::string> names;

@@ -51,7 +51,7 @@ const std::vector<GuaranteedMethod>& others() {
 /// level set, and its surface is closed.
 std::vector<std::string> models() {
   const std::vector<std::string> excluded = {
-      "thai-statue",  // its file is not in every data folder, and the stand-in has nine million triangles
+      "thai-statue",  // its file is not in every data directory, and the stand-in has nine million triangles
       "noise-sphere-10m",  // the surface of noise-sphere-1m, and at these resolutions the same level set
       "all-degenerate",    // seven triangles without area enclose nothing: there is no mesh to validate
   };
@@ -198,8 +198,8 @@ class SubjectMeasurement {
                    input_.parameters.is("certify", "yes") && resolution <= kFinestCertified});
   }
 
-  /// Even fields are uniform in [−1, 1], odd ones whole numbers, a third of them on the surface; the
-  /// background is outside.
+  /// Even fields are uniform in [−1, 1], odd ones integers, a third of them on the surface; the background is
+  /// outside.
   void measure_noise(int number, int n, const std::string& label) {
     // One generator per field, so that a field that violates a guarantee can be reproduced on its own.
     std::mt19937_64 random(input_.seed + std::uint64_t(number));

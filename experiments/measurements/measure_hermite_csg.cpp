@@ -62,7 +62,7 @@ FloatHermite sampled(const AnalyticSurface& solid, RunContext& context) {
   return sample_function(solid, lattice, {-26, -26, -26}, {26, 26, 26}, 1e-9, context);
 }
 
-/// Edges that are crossed in one of them alone, or differently.
+/// Edges that are crossed in only one of them, or differently.
 std::size_t differences(const FloatHermite& a, const FloatHermite& b) {
   std::size_t count_of = 0, in_both = 0;
   for (std::size_t i = 0; i < a.leaves.size(); ++i) {

@@ -117,8 +117,7 @@ class Race {
 };
 
 /// Times a conversion that moves so many bytes, and the memory, with 1, 2, 4, … threads: cores share the
-/// memory, so that a conversion bounded by arithmetic with few of them approaches the memory's speed with
-/// many.
+/// memory, so a conversion bounded by arithmetic with few of them approaches the memory's speed with many.
 void time_by_threads(const std::string& label, const std::function<double()>& conversion, double bytes,
                      int repetitions, Triad& triad, std::vector<MeasuredRow>& rows) {
   const std::vector<std::size_t> counts = thread_counts();

@@ -220,7 +220,7 @@ double pass(void (*loop)(const From*, To*, std::size_t), const std::vector<From>
   return 1e9 * (thread_seconds() - start) / (double(from.size()) * kRounds);
 }
 
-/// All codes and operations in turns.
+/// All codes and operations, interleaved.
 std::vector<MeasuredRow> measure_speed(const MeasurementInput& input) {
   std::vector<NormalCodeId> ids(kNormalCodes.begin(), kNormalCodes.end());
   std::erase_if(ids, [&](NormalCodeId id) { return !input.wants("speed", std::string(name(id))); });

@@ -25,7 +25,7 @@ constexpr std::array<double, 12> kAngles = {15, 30, 45, 60, 75, 85, 90, 95, 105,
 /// Upper ends of the classes of distances, voxels; the last class has none.
 constexpr std::array<double, 6> kClasses = {0.5, 1, 2, 4, 8, std::numeric_limits<double>::infinity()};
 
-// ---- The oracle: the voxels that a triangle meets.
+// ---- The oracle: the voxels that a triangle intersects.
 
 enum class Meeting { kNone, kTouching, kCertain };
 
@@ -56,7 +56,7 @@ Meeting meet(const GridTriangle& triangle, const Vector3d& centre, const Vector3
   return result;
 }
 
-/// Voxels that the triangle certainly meets, and those that it may touch.
+/// Voxels that the triangle certainly intersects, and those that it may touch.
 struct MetVoxels {
   std::vector<Voxel> certain, touching;
 };
@@ -103,9 +103,9 @@ void append_unique(std::vector<Voxel>& all, std::vector<std::vector<Voxel>>& par
 /// Boundary voxels of a model by the oracle and by samples.
 struct Boundary {
   std::vector<Voxel> met, touching, sampled;  ///< of the whole model, sorted, each once
-  std::size_t pairs = 0;                      ///< of triangles and voxels that they meet
+  std::size_t pairs = 0;                      ///< of triangles and voxels that they intersect
   std::size_t missed_pairs = 0;               ///< those of them without a sample
-  std::size_t invented = 0;                   ///< samples in a voxel that their triangle does not meet
+  std::size_t invented = 0;                   ///< samples in a voxel that their triangle does not intersect
 };
 Boundary rasterize(const std::vector<Vector3d>& points, const std::vector<Triangle>& triangles,
                    const RunContext& context) {

@@ -7,8 +7,7 @@
 //   2. Declare the function here and add it to the table in measurements.cpp.
 //   3. Describe its parameters and tables in experiments/measurements.toml.
 //   4. Write experiments/questions/thesis/NAME.toml, or in the directory of another subject;
-//   normal_codes.toml
-//      explains the keys.
+//      normal_codes.toml explains the keys.
 // Its rows then have commit, machine, seed and parameters, and `hermesh run` and `hermesh report` take it.
 #pragma once
 

@@ -22,7 +22,7 @@ constexpr int kSmallSheetPixels = 640;
 constexpr std::size_t kExact = 3'000'000;
 /// Pieces move away from the object's middle by this share of their distance.
 constexpr double kExplosion = 0.5;
-constexpr double kExplodedCloseUp = 0.07;  // of the box, so that polygons at some hundred voxels are visible
+constexpr double kExplodedCloseUp = 0.07;  // of the box, so that polygons at a few hundred voxels are visible
 
 struct Piece {
   PolygonMesh mesh;

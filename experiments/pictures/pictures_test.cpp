@@ -233,7 +233,7 @@ TEST(Slice, ColoursSayTheSideAndTheState) {
   const Image image = draw_slice(level_set, frame, 30);
   ASSERT_EQ(image.width, 30);
   ASSERT_EQ(image.height, 20);
-  // The second direction runs upwards, so that y = 0 is the lower half.
+  // The second direction runs upwards, so y = 0 is the lower half.
   const std::uint32_t inside = at(image, 5, 15), outside = at(image, 25, 15), deep = at(image, 15, 5);
   EXPECT_EQ(at(image, 15, 15), inside);
   EXPECT_EQ(at(image, 5, 5), outside);

@@ -29,8 +29,8 @@ using test_solids::solid;
 struct Pair {
   PolygonMesh a, b;
   double voxel_size;
-  /// True if nothing that the two bound is thinner than a voxel but where their surfaces cross, so that
-  /// volumes add up.
+  /// True if nothing that the two bound is thinner than a voxel except where their surfaces intersect, so
+  /// that volumes add up.
   bool adds_up = false;
 };
 
@@ -141,7 +141,7 @@ Pair dirty(Random& random) {
   return {a, placed(one(), random_turn(random), random_vector(random, 0.7)), voxel};
 }
 
-/// A solid of a few voxels beside, in and across a large one.
+/// A solid of a few voxels next to, inside and across a large one.
 Pair sizes(Random& random) {
   const double voxel = 2.0 / random.uniform(24.0, 40.0);
   const Vector3d at = random_vector(random, 0.2), of_other = random_vector(random, 1.1);

@@ -306,13 +306,13 @@ TEST(LatticeSolids, DistancesPassOverWallsWithin) {
   }
 }
 
-// ---- Random unions beside a lattice of cells.
+// ---- Random unions next to a lattice of cells.
 
 /// Components, handles and cavities of a set of cells whose border is a manifold.
 struct Border {
   double volume = 0.0, area = 0.0;
   int euler = 0;
-  bool manifold = true;  ///< no two of its cells meet at an edge or a corner alone
+  bool manifold = true;  ///< no two of its cells meet only at an edge or a corner
 };
 
 Border measure(const Cells& cells) {

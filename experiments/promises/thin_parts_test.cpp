@@ -1,5 +1,5 @@
-// Thin parts are kept: plates, shells, tubes, cones, wires and open sheets of known topology, thinner and
-// thicker than a voxel, turned and moved at random. Voxels are 1 wide.
+// Thin parts are preserved: plates, shells, tubes, cones, wires and open sheets of known topology, thinner
+// and thicker than a voxel, turned and moved at random. Voxels are 1 wide.
 #include "algorithms/remesh/thin_parts.h"
 
 #include <functional>
@@ -168,8 +168,8 @@ void expect_kept(const Surface& surface, double thickness, std::uint64_t seed) {
   EXPECT_LT(report.from_reference->max, kWireRadius + 0.25);
 }
 
-/// Offsets of a strip of one side meet each other, and the cavity of a closed shell is kept only if its wall
-/// has samples everywhere.
+/// Offsets of a one-sided strip meet each other, and the cavity of a closed shell is preserved only if its
+/// wall has samples everywhere.
 bool is_possible(const Surface& surface, double thickness) {
   if (surface.closes_v) return thickness > 1.3;
   return thickness == 0.0 || (!surface.twisted && surface.name != std::string("ribbon"));

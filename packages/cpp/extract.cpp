@@ -180,7 +180,7 @@ Mesh combine(Boolean operation, const Mesh& a, const Mesh& b, const VoxelizeOpti
     PolygonMesh copy_of_a, copy_of_b;
     const PolygonMesh& first = Inside::sampled(a, copy_of_a);
     const PolygonMesh& second = Inside::sampled(b, copy_of_b);
-    // A resolution counts along the longer operand, so that the order of the two does not matter.
+    // A resolution counts along the longer operand, so the order of the two does not matter.
     const bool second_is_longer = bounds(second).size().maxCoeff() > bounds(first).size().maxCoeff();
     const SharedLattice lattice =
         shared_lattice(first, second, voxel_size_of(second_is_longer ? second : first, voxelizing));

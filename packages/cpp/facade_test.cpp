@@ -179,7 +179,7 @@ TEST(PublicVolume, SharesALatticeWithAnother) {
   for (int row = 0; row < 3; ++row)
     for (int column = 0; column < 4; ++column)
       EXPECT_NEAR(second.placement().rows[row][column], first.placement().rows[row][column], 1e-15);
-  const std::vector<double> inside = {1.2, 1.2, 1.2};  // 0.1 from three faces of the second cube alone
+  const std::vector<double> inside = {1.2, 1.2, 1.2};  // 0.1 from three faces of only the second cube
   EXPECT_NEAR(second.sample(inside)[0], -0.1, 0.02);
   EXPECT_GT(first.sample(inside)[0], 0.1);
 }
@@ -375,7 +375,7 @@ TEST(PublicContext, AnExceptionOfTheCallbackComesOut) {
 
 TEST(PublicContext, NotesWhatIsThinnerThanAVoxel) {
   Context context;
-  // A plate of a tenth of a voxel, beside a cube.
+  // A plate of a tenth of a voxel, next to a cube.
   const Mesh a = cube(1.0);
   std::vector<double> points = a.world_points();
   std::vector<std::uint32_t> quads(a.quads().begin(), a.quads().end());

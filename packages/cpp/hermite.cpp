@@ -57,7 +57,7 @@ std::vector<float> Solid::crossing_points() const {
 
 std::vector<float> Solid::crossing_normals() const {
   const FloatHermite& hermite = Inside::data(*this).hermite;
-  // A plane's normal goes the way of the inverse transpose.
+  // A plane's normal is transformed by the inverse transpose.
   const Eigen::Matrix3d to_world = hermite.placement.linear.inverse().transpose();
   std::vector<float> normals;
   normals.reserve(3 * hermite.crossings.size());

@@ -43,7 +43,7 @@ inline hermesh::Mesh torus(double large = 1.0, double small = 0.4, int around = 
 
 inline hermesh::VoxelizeOptions at_resolution(int resolution) { return {.resolution = resolution}; }
 
-/// The sentence of the Error that `work` throws; empty if it throws none.
+/// Returns the message of the Error that `work` throws; empty if it throws none.
 template <class Work>
 std::string complaint(Work work) {
   try {

@@ -40,7 +40,7 @@ py::array polygon_array(const py::object& given, py::ssize_t corners, const std:
   return array.attr("view")("u4");
 }
 
-/// Attributes from dicts of arrays, which are kept alive.
+/// Attributes from dicts of arrays, whose references are held.
 struct GivenAttributes {
   std::vector<Attribute> attributes;
   std::vector<py::array> arrays;

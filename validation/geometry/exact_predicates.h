@@ -49,7 +49,7 @@ bool same_side(const Eigen::Vector3d& p, const Eigen::Vector3d& q, const Eigen::
 /// area, meet.
 bool segment_meets_triangle(const Eigen::Vector3d& p, const Eigen::Vector3d& q, const Corners& t);
 
-/// Returns true if two closed triangles, of more than zero area each, meet.
+/// Returns true if two closed triangles, each of nonzero area, intersect.
 bool triangles_meet(const Corners& s, const Corners& t);
 
 }  // namespace hermesh::validation

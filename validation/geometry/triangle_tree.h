@@ -62,7 +62,8 @@ class TriangleTree {
     return traverse([&](const Box& node) { return slabs.meet(node); }, visit);
   }
 
-  /// Calls visit(other) for each leaf `other` ≥ `leaf` whose box meets that leaf's box, in increasing order.
+  /// Calls visit(other) for each leaf `other` ≥ `leaf` whose box overlaps that leaf's box, in increasing
+  /// order.
   template <class Visit>
   void for_each_overlapping_leaf(std::size_t leaf, const Visit& visit) const {
     const Box& box = leaf_box(leaf);

@@ -16,8 +16,8 @@ using Eigen::Vector3d;
 
 constexpr int kLevels = 4;  ///< blocks of 2^kLevels voxels are the largest
 /// Largest root mean square distance of a node's vertex from the planes that it represents, in tolerances.
-/// (With 0.45 the proof undoes some tenth of the merged vertices, on CAD three quarters; with 0.1 bold
-/// collapses take three times as long.)
+/// (With 0.45 the proof undoes about a tenth of the merged vertices, on CAD three quarters; with 0.1
+/// unverified collapses take three times as long.)
 constexpr double kShare = 0.3;
 /// Largest cost of a node's planes, as a share of the largest cost of a collapse if there is one. (Without
 /// this limit blocks leave a mesh twice as far away as collapses would; a tenth costs 2 % of the distance, a

@@ -20,7 +20,7 @@ CertifiedMesh decimate_certified(const FineMesh& fine, const std::vector<float>&
     Stage stage(context, name);
     return work();
   };
-  // Blocks are by far the cheapest way to remove most vertices. Until careful collapses have run, only the
+  // Blocks are by far the cheapest way to remove most vertices. Until verified collapses have run, only the
   // topology is tested.
   MergeForest forest = timed("decimate", [&] { return block_forest(input, context); });
   MergeProof proof(forest, fine, tolerance, context, pieces);

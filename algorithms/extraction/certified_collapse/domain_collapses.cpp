@@ -60,17 +60,18 @@ using Eigen::Vector3d;
 
 /// Least shape() of a triangle that a collapse makes, unless it replaces a worse one.
 constexpr double kPoorShape = 0.05;
-/// A triangle may not turn by more than some 84 degrees in one collapse.
+/// A triangle may not rotate by more than about 84 degrees in one collapse.
 constexpr double kLeastCosineToOld = 0.1;
-/// Largest angle, some 72 degrees, between a triangle of a bold collapse, which tests no distance, and the
-/// fine triangle that it began as. A triangle that faced the wrong way before can thus turn back.
+/// Largest angle, about 72 degrees, between a triangle of an unverified collapse (Collapses::bold), which
+/// tests no distance, and the fine triangle that it originates from. So a triangle that was reversed before
+/// can turn back.
 constexpr double kLeastCosineToFine = 0.3;
 /// Largest mean squared distance of the new vertex to the planes that the ends of an edge represent, in
 /// squared tolerances: beyond, the edge is not worth a test. (1 would lose some 4 % of the collapses of a
 /// scan, 4 none and save nothing.)
 constexpr double kHopeless = 2.0;
-/// The same for a bold collapse, which has no other distance test. (With 0.3 the proof undoes a third of the
-/// collapses, with 0.03 nearly all is left to careful collapses, which cost five times as much each.)
+/// The same for an unverified collapse, which has no other distance test. (With 0.3 the proof undoes a third
+/// of the collapses, with 0.03 nearly all is left to verified collapses, which cost five times as much each.)
 constexpr double kBold = 0.12;
 
 /// Returns the shape of a triangle, 1 for equilateral and 0 for degenerate: its area over the sum of its

@@ -16,7 +16,7 @@ namespace {
 
 using Eigen::Vector3d;
 
-constexpr double kFirstSide = 32.0;  ///< voxels: some thousand triangles, which fit a core's cache
+constexpr double kFirstSide = 32.0;  ///< voxels: about a thousand triangles, which fit a core's cache
 /// Displacement of the domains of a round, as a share of their side, so that no two rounds share borders.
 constexpr double kDisplacement = 0.382;
 /// Longest edge that a round makes, as a share of the side: parts at a border must not stay much finer.

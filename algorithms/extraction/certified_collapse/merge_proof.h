@@ -33,8 +33,8 @@ struct MergedMesh {
 /// **The argument.**
 /// - *Topology.* Every set is a disc or a tree: one of a block by its Euler characteristic, two joined by an
 ///   edge by the link condition, a move because it has one child. If no directed edge of the merged mesh
-///   occurs twice, two sets share at most one piece of border, and the merged mesh is a triangulation of the
-///   fine surface. (Edges of the fine mesh itself may belong to several patches.)
+///   occurs twice, two sets share at most one piece of boundary, and the merged mesh is a triangulation of
+///   the fine surface. (Edges of the fine mesh itself may belong to several patches.)
 /// - *Merged to fine.* Each merged triangle is certified to be near the fine mesh (distance_certificate.h).
 ///   The fine mesh does not change, so this proof remains valid as long as the triangle stays.
 /// - *Fine to merged.* Each fine triangle is certified to be near the merged mesh, or is covered by a merged
@@ -82,7 +82,7 @@ class MergeProof {
   enum Proof : std::uint8_t {
     kStays = 1,    ///< it is a triangle of the merged mesh
     kNear = 2,     ///< the merged triangle is near the fine mesh
-    kApart = 4,    ///< the merged triangle was tested against all others; it meets none, or waits for a split
+    kApart = 4,    ///< tested against all other triangles; it intersects none, or waits for a split
     kCovered = 8,  ///< the fine triangle is near the merged mesh
     kFar = 16,     ///< kCovered also rests on a merged triangle with no corner in the fine triangle's sets
     kOpen = 32     ///< the fine triangle is in `open_`

@@ -32,8 +32,9 @@ struct DecimationInput {
 /// disc or a tree and their planes pass well within the tolerance of one position.
 MergeForest block_forest(const DecimationInput& input, const RunContext& context);
 
-/// Tests of a collapse. Bold ones look only at the quadrics. Careful ones keep every sample (vertex of the
-/// fine mesh) near a triangle, and the new vertex and the new edges near the fine mesh.
+/// Tests of a collapse. `bold` collapses are unverified: only the quadrics are evaluated. `careful` ones are
+/// verified: every sample (vertex of the fine mesh) stays near a triangle, and the new vertex and the new
+/// edges stay near the fine mesh.
 enum class Collapses { bold, careful };
 
 /// Collapses edges of `merged`, the mesh of `forest`, and joins the sets of their ends.

@@ -76,7 +76,7 @@ ShellVolumes::ShellVolumes(const FineMesh& fine, std::span<const TrianglePieces>
     }
   }
   volumes_ = volumes_of(fine.points(), triangles, numbers);
-  // The volume of a shell with a border means nothing.
+  // The volume of a shell with a boundary is undefined.
   if (pieces.empty())
     for (const std::uint32_t t : numbers)
       for (int i = 0; i < 3; ++i)

@@ -53,7 +53,7 @@ class ShellVolumes {
   std::vector<std::uint32_t> by_point_;                    ///< shell of each point; empty for a complex
   std::vector<std::array<std::uint32_t, 2>> by_triangle_;  ///< shells of each triangle; empty without pieces
   std::vector<std::uint32_t> apex_;  ///< a vertex of each shell, about which its volume is computed
-  std::vector<double> volumes_;      ///< of each shell of the fine mesh, voxels³; 0 if it has a border
+  std::vector<double> volumes_;      ///< of each shell of the fine mesh, voxels³; 0 if it has a boundary
 };
 
 }  // namespace hermesh

@@ -8,7 +8,7 @@ namespace hermesh {
 namespace {
 
 /// Threshold of the area of a parallelogram seen along a direction, in square voxels: far above the rounding
-/// error for sides of some tens of voxels.
+/// error for sides of a few tens of voxels.
 constexpr double kTurnedUp = 1e-9;
 
 }  // namespace

@@ -43,7 +43,7 @@ namespace hermesh {
 ///
 /// A single cell with a polygon at a cube has a diagonal within the tolerance, and contains both meshes.
 /// Elsewhere T is S, except that a loose polygon may leave its regions. S must be near it, which is proved in
-/// the same way for the box of lattice cells around it, with a layer for it and S, which intersects the
+/// in the same way for the box of lattice cells around it, with a layer for it and S, which intersects the
 /// polygon's edge there.
 class RegionLayers {
  public:

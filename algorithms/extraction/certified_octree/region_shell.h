@@ -30,13 +30,13 @@ namespace hermesh {
 /// a triangle, directions are interpolated between the corners. Over each triangle there is a prism, which
 /// extends up and down along its pillars by the tolerance; prisms of adjacent triangles share a wall. The
 /// proof establishes that
-///   - pillars rise over their triangles and neither meet nor cross, so that each point of a prism lies on
-///   one line of it;
+///   - pillars rise over their triangles and do not intersect, so each point of a prism lies on one line of
+///     it;
 ///   - all triangles of S that extend into a prism (by 1e-6 voxel or more) face up along its pillars, and
-///   stay between its lid and its bottom;
+///     stay between its lid and its bottom;
 ///   - S is in it, with a triangle of one of the cells of the polygon's regions;
 ///   - at sides between two single cells, beyond which T may be S, S continues into the prism: otherwise it
-///   could bulge out between T and its intersection with the lines of the prism.
+///     could bulge out between T and its intersection with the lines of the prism.
 /// Then every line of a prism intersects S exactly once. Not twice, because S would have to face down in
 /// between; and at least once, because the lines that do form an open and closed set: S has no boundary, and
 /// leaves through the walls only. So each point of T has a point of S within the tolerance. As S enters the

@@ -23,7 +23,7 @@ class ShellPrism {
   /// Builds a prism over a triangle. `pillars` are unit directions; `height` is its extent up and down.
   ShellPrism(const Corners& corners, const std::array<Eigen::Vector3d, 3>& pillars, double height);
 
-  /// Returns true if all pillars rise over the triangle, and do not meet or cross. Otherwise the prism is
+  /// Returns true if all pillars rise over the triangle, and do not intersect. Otherwise the prism is
   /// invalid.
   bool stands() const { return stands_; }
 

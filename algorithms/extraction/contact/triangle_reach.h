@@ -11,7 +11,7 @@
 
 namespace hermesh {
 
-/// Tests if points are near a triangle, by the triangle's plane and the three planes through its sides
+/// Tests whether points are near a triangle, by the triangle's plane and the three planes through its sides
 /// perpendicular to it. These decide most points; only those next to the triangle need the exact distance.
 class TriangleReach {
  public:

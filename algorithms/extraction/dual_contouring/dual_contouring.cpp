@@ -218,8 +218,8 @@ class Contourer {
     for_each_edge_with_cells(grid_.blocks(), static_cast<std::size_t>(b), connect_edge);
   }
 
-  /// Returns where the plane of three vertices meets the lattice edge's line, along the axis; NaN if they are
-  /// collinear.
+  /// Returns where the plane of three vertices intersects the lattice edge's line, along the axis; NaN if
+  /// they are collinear.
   double height(const Quad& quad, std::array<int, 3> corners, const Eigen::Vector3d& hit, int axis) const {
     // Relative to the crossing: a height of 0 means that the surface passes through it.
     const Eigen::Vector3d a = positions_[quad[corners[0]]] - hit;

@@ -10,10 +10,10 @@
 
 namespace hermesh {
 
-/// The loops in which the surface meets the boundary of a cell, and the sheets that they bound. On each face,
-/// straight segments connect the crossings of the face's edges. A face whose corners alternate in sign is
-/// ambiguous and gets two segments, which cut off its inside corners one by one. Both cells at the face draw
-/// it alike. The segments of a cell thus form closed loops, and each loop bounds one sheet.
+/// The loops in which the surface intersects the boundary of a cell, and the sheets that they bound. On each
+/// face, straight segments connect the crossings of the face's edges. A face whose corners alternate in sign
+/// is ambiguous and gets two segments, which cut off its inside corners one by one. Both cells at the face
+/// draw it alike. The segments of a cell thus form closed loops, and each loop bounds one sheet.
 struct CellSheets {
   static constexpr std::uint8_t kNone = 255;
 

@@ -77,7 +77,7 @@ class PolygonNeighbourhood {
     return box;
   }
 
-  /// Returns true if two triangles certainly meet in nothing but their shared corners.
+  /// Returns true if two triangles certainly intersect only in their shared corners.
   bool apart(const Triangle& a, const Triangle& b) const { return certainly_apart(a, b, points_); }
 
  private:

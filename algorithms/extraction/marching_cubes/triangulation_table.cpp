@@ -78,8 +78,8 @@ constexpr CellTriangles triangulate_pattern(int pattern) {
   CellTriangles result;
   const std::array<int, 12> next = segments(pattern);
   std::array<bool, 12> done{};
-  // Two faces share an edge and traverse it in opposite directions, so that it is entered on one and left on
-  // the other: each crossed edge has one successor and one predecessor, and the segments form closed loops.
+  // Two faces share an edge and traverse it in opposite directions, so it is entered on one and left on the
+  // other: each crossed edge has one successor and one predecessor, and the segments form closed loops.
   for (int start = 0; start < 12; ++start) {
     if (next[start] < 0 || done[start]) continue;
     Loop loop;

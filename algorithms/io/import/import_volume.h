@@ -1,11 +1,11 @@
 // Scalar volumes of other programs: NIfTI-1 and raw samples.
 //
-// The result is a grid of floats with an active sample for each of the file's, so that the active voxels fill
-// the box of the data (extraction/volume_ends.h needs its ends); constant regions become tiles. Its transform
-// takes index coordinates to millimetres. Its class is "unknown", since it is no distance. Its background is
-// the next single precision below the smallest value: values greater than an isovalue are inside. Metadata
-// give the source: hermesh_source (the file's name without directories), hermesh_sample_type, hermesh_minimum
-// and hermesh_maximum, the bounds of useful isovalues.
+// The result is a grid of floats with an active sample for each of the file's, so the active voxels fill the
+// box of the data (extraction/volume_ends.h needs its ends); constant regions become tiles. Its transform
+// takes index coordinates to millimetres. Its class is "unknown", since its values are not distances. Its
+// background is the next single precision below the smallest value: values greater than an isovalue are
+// inside. Metadata give the source: hermesh_source (the file's name without directories),
+// hermesh_sample_type, hermesh_minimum and hermesh_maximum, the bounds of useful isovalues.
 //
 // Debian's libniftiio is not used: it writes errors to stderr, allocates the memory that a header claims
 // before it checks the file, and multiplies dimensions unchecked.
@@ -38,7 +38,7 @@ std::string name_of(SampleFormat format);  ///< "int16le", "uint8"
 SampleFormat parse_sample_format(const std::string& name);
 
 struct ImportOptions {
-  /// Replaces samples that are NaN, infinite or too large for single precision, which are refused otherwise.
+  /// Replaces samples that are NaN, infinite or too large for single precision, which are otherwise an error.
   std::optional<float> replacement;
   /// Frame, from 0, of NIfTI files of more than three dimensions; by default the first, with a note.
   std::optional<std::int64_t> frame;
@@ -68,8 +68,8 @@ struct RawLayout {
 };
 
 /// Imports raw samples, the first of which is at the origin of the world. @throws Error like import_nifti(),
-/// for a spacing that is not finite and above 0, and for a file that goes on behind the last sample, which
-/// shows wrong dimensions.
+/// for a spacing that is not finite and above 0, and for a file with data after the last sample, which shows
+/// wrong dimensions.
 LevelSet import_raw(const std::filesystem::path& path, const RawLayout& layout, const ImportOptions& options,
                     RunContext& context);
 

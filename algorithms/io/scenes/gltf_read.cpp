@@ -223,17 +223,17 @@ class GltfReader {
 
   // ---- Lookup. Each of these throws an Error if the JSON has another structure.
 
-  /// Returns a member of an object; null if it has none, or is no object.
+  /// Returns a member of an object; null if it has none, or is not an object.
   const Json* member(const Json& object, const char* key) const {
     const auto found = object.is_object() ? object.find(key) : object.end();
     return object.is_object() && found != object.end() ? &*found : nullptr;
   }
 
-  /// Returns a member that is a whole number, such as an index, a length or an offset, if there is one.
+  /// Returns a member that is an integer, such as an index, a length or an offset, if there is one.
   std::optional<std::size_t> count_if_any(const Json& object, const char* key) const {
     const Json* const value = member(object, key);
     if (!value) return std::nullopt;
-    // Whole numbers with a decimal point are legal JSON.
+    // Integers with a decimal point are valid JSON.
     const double number = value->is_number() ? value->get<double>() : -1.0;
     if (!(number >= 0.0 && number <= 9007199254740992.0 && number == std::floor(number)))
       builder_.fail("its '", key, "' must be a whole number that is not negative; the file is damaged");
@@ -569,7 +569,8 @@ class GltfReader {
     return result;
   }
 
-  /// Returns the root nodes: those of the default scene, else of the first one, else all that are no child.
+  /// Returns the root nodes: those of the default scene, else of the first one, else all nodes that are not
+  /// children.
   std::vector<std::size_t> roots() {
     // Scenes are alternatives, which would overlap.
     const std::size_t scenes = list(root_, "scenes").size();

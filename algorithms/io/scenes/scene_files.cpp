@@ -5,7 +5,7 @@
 namespace hermesh::mesh_formats {
 
 std::optional<Eigen::Vector3d> stated_origin(const PolygonMesh& mesh) {
-  // As in to_mesh_file(): left out only at 0, if a reader would choose 0 by itself.
+  // As in to_mesh_file(): left out only at 0, if a reader would choose 0 by default.
   if (mesh.origin.isZero(0.0) && choose_origin(bounds(mesh)).isZero(0.0)) return std::nullopt;
   return mesh.origin;
 }

@@ -70,7 +70,7 @@ struct ScenePart {
 };
 
 /// Adds parts to the mesh of a builder and sums up their memory, so that a small file which repeats its parts
-/// millions of times is refused before the memory is taken.
+/// millions of times is rejected before the memory is allocated.
 class PartPlacer {
  public:
   explicit PartPlacer(MeshBuilder& builder) : builder_(builder) {}

@@ -29,7 +29,7 @@ class ThreeMfFileTest : public MeshFileTest {
   std::string error_of(const std::string& model) {
     return MeshFileTest::error_of("a.3mf", three_mf_of(model));
   }
-  /// Holds that the sentence about this model names the file and has these words in it.
+  /// Expects that the message about this model names the file and contains these words.
   void expect_error(const std::string& model, const std::string& part) {
     const std::string sentence = error_of(model);
     expect_words(sentence, part);

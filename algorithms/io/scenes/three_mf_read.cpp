@@ -43,7 +43,7 @@ constexpr XML_Memory_Handling_Suite kMemory = {take, take_again, give_back};
 
 /// Parses the XML of a member of an archive while it is unpacked, without a tree in memory, and calls the
 /// visitors of its elements. Comments, processing instructions and everything behind the first element are
-/// ignored. A document type is refused, as formats based on XML do, since its entities can make a few bytes
+/// ignored. A document type is rejected, as formats based on XML do, since its entities can make a few bytes
 /// into millions. Errors name the line; if the archive is damaged, that is the error.
 class XmlReader {
  public:
@@ -141,7 +141,7 @@ class XmlReader {
   };
   static XmlReader& self(void* user) { return *static_cast<XmlReader*>(user); }
 
-  /// Runs `work` for the parser, which calls from C, so that no exception may leave it.
+  /// Runs `work` for the parser, which calls from C, so no exception may leave it.
   template <class Work>
   void guard(Work&& work) {
     // The parser reports the end of an element even if it was stopped at its start.

@@ -101,7 +101,7 @@ int gather_planes(const EdgeSource& edges, const HermiteView::Block& block, Plan
     for (int part = 0; part < 8; ++part) {
       const int d[3] = {part >> 2, (part >> 1) & 1, part & 1};
       const std::int32_t number = block.neighbours[neighbour_slot(d[0], d[1], d[2])];
-      // An edge along the axis that begins in an upper neighbour on that axis is no edge of these cells.
+      // An edge along the axis that begins in an upper neighbour on that axis is not an edge of these cells.
       if (d[axis] || number < 0 || edges.blocks()[number].leaf < 0) continue;
       end = gather_owned(edges, number, axis, d, end);
     }
@@ -405,7 +405,7 @@ class BlockMerger {
 /// Merges the cells of one block. Writes for each active one of the 512 cells its point and level to `mask`,
 /// whose other entries are unchanged, and that many points, voxels from the block's first sample, to
 /// `points`, which has room for 512. Cells are active that lie around a tagged edge, less those that the
-/// field leaves out. Blocks do not depend on each other, so that any thread may merge any.
+/// field leaves out. Blocks do not depend on each other, so any thread may merge any.
 BlockResult merge_block(const RegionInput& input, std::int32_t block, std::uint16_t* mask,
                         Eigen::Vector3f* points) {
   return BlockMerger(input, block).merge(mask, points);
@@ -475,7 +475,7 @@ class AdaptiveContourer {
   /// Blocks of a task. Groups depend only on the data, and so does the order of points and polygons.
   static constexpr std::size_t kGroup = 64;
 
-  /// Merges the cells of every block by itself, as §6.4 does. Groups of blocks store their points until the
+  /// Merges the cells of every block separately, as §6.4 does. Groups of blocks store their points until the
   /// number of points before them is known: far fewer than active cells.
   void merge() {
     Stage stage(context_, "merge cells");
@@ -575,7 +575,7 @@ class AdaptiveContourer {
     for (std::size_t b = group * kGroup; b < std::min(blocks_, (group + 1) * kGroup); ++b) f(b);
   }
 
-  /// Reports the figures of the run, added up in the order of the blocks.
+  /// Reports the statistics of the run, summed in the order of the blocks.
   void report() const {
     const auto sum = [&](auto&& of) {
       return std::accumulate(results_.begin(), results_.end(), 0.0,
@@ -597,7 +597,7 @@ class AdaptiveContourer {
       }
   }
 
-  /// Reports the figures about points outside their regions (trap T7).
+  /// Reports the statistics of points outside their regions (trap T7).
   void report_escapes() const {
     std::array<double, kEscapeRanges.size() + 1> escaped{};
     float largest = 0.0f;

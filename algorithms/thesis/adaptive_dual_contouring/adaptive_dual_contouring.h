@@ -10,11 +10,11 @@
 //        truncated singular value decomposition and is not constrained to its region (trap T7; counted
 //        by the statistics `escaped…`).
 //   6.3  both topology tests, the first by a table. They gate only merging: a cell with several sheets still
-//        has one point, so that edges and points may be non-manifold even at threshold 0 (trap T5). Each can
-//        be switched off, to see its effect.
+//        has one point, so edges and points may be non-manifold even at threshold 0 (trap T5). Each can be
+//        switched off, to see its effect.
 //   6.4  steps 1 to 4: active are the cells around edges tagged with data; level by level, a region is tried
 //        only if all its active cells are mergeable, and its cells are no longer mergeable once it fails;
-//        every block by itself; a mask grid of integers, which finally hold the number of the cell's point:
+//        every block separately; a mask grid of integers, which finally hold the number of the cell's point:
 //        16 bits that count within the block, where the thesis has 32. (During the work on a block its levels
 //        and flags are one bit per region.)
 //   6.5  for every crossing edge the four cells around it give a quad, a triangle if they have three points,
@@ -39,8 +39,8 @@
 //
 // The unit of the threshold (trap T6) is not in the text, and E grows with the number of cells. Here lengths
 // are voxels and normals have unit length, so E is in square voxels. The thesis's 0 to 2000 cannot be that: a
-// region has some 300 planes, so that 2000 would let every one be two voxels off. Its reductions are met if
-// 1000 of its units, within a quarter, are one square voxel, with Hermite data quantised as there
+// region has about 300 planes, so 2000 would let every one be two voxels off. Its reductions are met if 1000
+// of its units, within a quarter, are one square voxel, with Hermite data quantised as there
 // (experiments/questions/thesis/table_9_2.toml).
 //
 // Cost: without the Hermite data three quarters of the time are merging, about evenly the sums of the QEFs,
@@ -87,8 +87,8 @@ struct AdaptiveOptions {
   TopologyTests topology_tests = TopologyTests::both;
 };
 
-/// Upper ends, in voxels, of the ranges of the figures `escaped_to_…`, which count points by their distance
-/// outside: each range begins where the previous one ends, the first above 0.
+/// Upper ends, in voxels, of the ranges of the statistics `escaped_to_…`, which count points by their
+/// distance outside: each range begins where the previous one ends, the first above 0.
 inline constexpr std::array<float, 6> kEscapeRanges{0.01f, 0.1f, 0.5f, 1.0f, 2.0f, 4.0f};
 
 /// Meshes Hermite data adaptively. The mesh is closed and oriented, in the sense that as many polygons pass
@@ -108,11 +108,11 @@ inline constexpr std::array<float, 6> kEscapeRanges{0.01f, 0.1f, 0.5f, 1.0f, 2.0
 PolygonMesh adaptive_dual_contouring(const FloatHermite& hermite, const AdaptiveOptions& options,
                                      const AdaptivityField* field, RunContext& context);
 
-/// Meshes the thesis's 10 bytes as they are packed (§6.1), by the edges that have data according to their
+/// Meshes the thesis's packed 10-byte voxels directly (§6.1), by the edges that have data according to their
 /// voxel. So the mesh has holes where a crossing is lost (trap T2), and polygons inside or outside of the
 /// solid where eq. 7.1 left data between samples of one sign (trap T11): it is neither closed nor oriented.
-/// Otherwise as above. Further figures are `lost_crossings` and `needless_crossings`, in this order; a note
-/// reports losses.
+/// Otherwise as above. Further statistics are `lost_crossings` and `needless_crossings`, in this order; a
+/// note reports losses.
 PolygonMesh adaptive_dual_contouring(const ThesisDense& hermite, const AdaptiveOptions& options,
                                      const AdaptivityField* field, RunContext& context);
 

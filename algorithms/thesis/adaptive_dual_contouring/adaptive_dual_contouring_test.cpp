@@ -206,7 +206,7 @@ TEST(TopologyTests, EachKeepsWhatTheOtherLetsGo) {
   EXPECT_TRUE(near_ball(made(small_ball(), Tests::table)));
   EXPECT_TRUE(near_ball(made(small_ball(), Tests::signs)));
   EXPECT_FALSE(near_ball(made(small_ball(), Tests::none)));
-  // On noise each test refuses regions that the other lets pass, so that both together leave the most points.
+  // On noise each test refuses regions that the other lets pass, so both together leave the most points.
   const LevelSet volume = noise(33, 4);
   const std::size_t both = made(volume, Tests::both).points.size(),
                     table = made(volume, Tests::table).points.size(),
@@ -220,7 +220,7 @@ TEST(TopologyTests, EachKeepsWhatTheOtherLetsGo) {
 
 TEST(AdaptiveDualContouring, TrianglesLieWhereLevelsMeet) {
   // A polygon has as many corners as there are different cells and regions around its edge. Around an edge
-  // with regions of one level there are one, two or four of them, so that a triangle needs two levels.
+  // with regions of one level there are one, two or four of them, so a triangle needs two levels.
   for (const LevelSet& volume : {sphere(40.0), noise(41, 6)}) {
     const Result result = contour(volume, {.threshold = 0.05});
     const auto figure = [&](const std::string& name) { return result.figures.at(name); };

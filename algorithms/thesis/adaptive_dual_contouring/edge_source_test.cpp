@@ -114,7 +114,8 @@ TEST_F(EdgeSourceTest, LostCrossingsAreHolesInTheMesh) {
   EXPECT_GE(boundary_edges(open), lost);
   EXPECT_EQ(boundary_edges(mesh(repaired, 0.0)), 0u);
   EXPECT_EQ(mesh(repaired, 0.0).quads.size(), sparse.crossings.size());
-  // Holes of a row of cells within one region close where the region's point covers them; the figure stays.
+  // Holes of a row of cells within one region close where the region's point covers them; the statistic does
+  // not change.
   mesh(dense, 1.0);
   EXPECT_EQ(figure("lost_crossings"), double(lost));
 }

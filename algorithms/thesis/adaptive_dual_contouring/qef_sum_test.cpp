@@ -121,8 +121,7 @@ TEST(QefSum, WithoutTruncationNearlyParallelPlanesMeetWhereTheyDo) {
   // Along x the two normals have the singular value √2·0.01, the others √2 and none at all.
   EXPECT_NEAR(minimiser(planes.sum, 0.1)[0], 0.0, 1e-3);
   EXPECT_LT((minimiser(planes.sum, 0.0) - Vector3d(10.0, 0.0, 0.1)).norm(), 1e-3);
-  // The least truncation leaves a direction without a singular value unchanged, so that no position is
-  // infinite.
+  // The least truncation leaves a direction without a singular value unchanged, so no position is infinite.
   EXPECT_EQ(minimiser(planes.sum, 0.0), minimiser(planes.sum, kLeastTruncation));
 }
 

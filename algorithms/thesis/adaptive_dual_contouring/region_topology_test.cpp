@@ -42,7 +42,7 @@ TEST(RegionTopology, TheTableIsTheCollapseDoneByHand) {
   EXPECT_EQ(manifold, 126);
 }
 
-/// The sign tests of §6.3 sentence by sentence, for one region of 3³ samples.
+/// The sign tests of §6.3, literally, for one region of 3³ samples.
 bool middles_by_hand(Signs27 signs) {
   const auto sign = [&](int x, int y, int z) { return (signs >> (9 * x + 3 * y + z)) & 1; };
   for (int x = 0; x < 3; ++x)

@@ -104,7 +104,7 @@ struct Operand {
   typename Tree::Ptr changeable() const { return alone ? tree : std::make_shared<Tree>(*tree); }
 };
 
-/// Turns a tree into its complement, in place. `Rules` is a type of voxel_rules.h.
+/// Replaces a tree by its complement, in place. `Rules` is a type of voxel_rules.h.
 template <class Rules>
 class Complement {
  public:
@@ -113,7 +113,7 @@ class Complement {
   template <class Root>
   void turn_root(Root& root) const {
     using Voxel = typename Root::ValueType;
-    // Children are turned below and not by OpenVDB.
+    // Children are complemented below, not by OpenVDB.
     root.setBackground(uniform_voxel<Voxel>(!root.background().inside()), false);
     for (auto tile = root.beginValueAll(); tile; ++tile) tile.setValue(uniform_voxel<Voxel>(!tile->inside()));
     for (auto child = root.beginChildOn(); child; ++child) turn(*child);

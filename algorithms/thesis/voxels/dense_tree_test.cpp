@@ -74,8 +74,8 @@ TYPED_TEST(DenseTreeOf, TreesOfDisjointSolidsCombine) {
   for (auto it = tree_of(b).cbeginValueOn(); it; ++it) ASSERT_TRUE(tree.getValue(it.getCoord()) == *it);
 }
 
-// merge() moves nodes that only the other tree has. It takes no inactive tiles, so that of two solids in one
-// node the inside of the second has to be filled again; in separate nodes everything is transferred.
+// merge() moves nodes that only the other tree has. It takes no inactive tiles, so of two solids in one node
+// the inside of the second has to be filled again; in separate nodes everything is transferred.
 TYPED_TEST(DenseTreeOf, MergingMovesNodes) {
   const FloatHermite left = to_sparse(sample_solid(ball(12, 12, 12, 9.3)));
   for (const int distance : {64, 256}) {
@@ -127,7 +127,7 @@ TEST_F(DenseTiles, ABigBallIsFilledWithTiles) {
 }
 
 /// Two walls perpendicular to z, 8 samples square, at z0 and z1, with the space between them inside: the
-/// upper wall's leaf is entirely inside, so that the middle has to be filled from the leaves at the ends. The
+/// upper wall's leaf is entirely inside, so the middle has to be filled from the leaves at the ends. The
 /// sides are omitted, which makes the data inconsistent but the expected tiles obvious.
 FloatHermite column(int z0, int z1) {
   FloatHermite hermite;

@@ -30,10 +30,10 @@ struct Represented {
   std::size_t lost = 0;       ///< number of lost crossings, which were replaced by the middle of their edges
 };
 
-/// Adds figures to the run: the bytes of the representation, in total, per crossing and per active voxel of
-/// the level set.
+/// Adds statistics to the run: the bytes of the representation, in total, per crossing and per active voxel
+/// of the level set.
 void report_size(const Represented& data, const LevelSet& level_set, RunContext& context);
-/// Adds those figures and the number of lost crossings, with a note if there are any.
+/// Adds those statistics and the number of lost crossings, with a note if there are any.
 void report_figures(const Represented& data, const LevelSet& level_set, RunContext& context);
 
 /// Stores the data in a representation, with normals in `code` if it packs them, and reads them again.

@@ -50,9 +50,9 @@ struct RuledVoxel {
 
 /// Equation 7.1 as printed, on the codes. It leaves a component without data open; here it is infinite, with
 /// the sign of the voxel, as the distances of a narrow band are where it ends. The thesis's author later
-/// published minima and maxima (openvdb/math/Hermite.cc of OpenVDB 2) that take it for 0, so that a union
-/// with a voxel outside loses each of the other's crossings that is entered there: the equation can hardly
-/// mean that.
+/// published minima and maxima (openvdb/math/Hermite.cc of OpenVDB 2) that take it for 0, so a union with a
+/// voxel outside loses each of the other's crossings that is entered there: the equation can hardly mean
+/// that.
 struct PrintedVoxel {
   using Voxel = ThesisVoxel;
 

@@ -187,7 +187,7 @@ class ThesisVoxel : public TenByteVoxel, public VdbValue<ThesisVoxel> {
 };
 static_assert(sizeof(ThesisVoxel) == 10);
 
-/// The ten bytes of ThesisVoxel without its losses: a crossing is absent if its offset's code says so
+/// The ten bytes of ThesisVoxel without its losses: a crossing is absent if its offset has the code for that
 /// (crossing.h), so any normal is valid, and offsets are rounded to the nearest of levels that include 0 and
 /// 1. The code of the normals is a property of the grid. Bit 30 is unused. Combining grids works on the codes
 /// without unpacking.

@@ -213,7 +213,7 @@ class LeafWork {
     kernels_.update_from_many(lazy, float(reach_), ids_, distances_);
     for (const TriangleBins::Cluster& cluster : clusters_) {
       // Edges are still found from the triangles; most clusters of tiny ones lie between the grid lines.
-      // Being at an edge does not depend on the reach, so that any reach is correct here.
+      // Being at an edge does not depend on the reach, so any reach is correct here.
       if (!meets_edges(cluster.box)) continue;
       fetch(cluster.triangles, fetched_);
       const unsigned there = (2u << (cluster.triangles.size() - 1)) - 1;
@@ -250,8 +250,8 @@ class LeafWork {
     return &batch;
   }
 
-  /// Returns true if an edge of this leaf may meet the box: an edge lies at whole numbers on two axes, so
-  /// that at least two of the box's sides must contain one. The margin of 1e-5 is wider than kSideShift.
+  /// Returns true if an edge of this leaf may intersect the box: an edge has integer coordinates on two axes,
+  /// so that at least two of the box's sides must contain one. The margin of 1e-5 is wider than kSideShift.
   bool meets_edges(const Bounds& box) const {
     int across = 0;
     for (std::size_t a = 0; a < 3; ++a) {

@@ -48,7 +48,7 @@ struct BandWork {
 };
 
 /// Calls found(leaf) once for each block, in any order and from several threads at once; `leaf` does not
-/// depend on either. Distances are exact to some 1e-6 voxel: every triangle that can be nearest to a voxel
+/// depend on either. Distances are exact to about 1e-6 voxel: every triangle that can be nearest to a voxel
 /// within reach is tested. Afterwards the bins have no clusters, unless they have one slab.
 /// @throws Cancelled.
 void find_leaves(const IndexSoup& soup, TriangleBins& bins, const BandWork& work, RunContext& context,

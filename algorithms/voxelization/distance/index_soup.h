@@ -60,9 +60,9 @@ struct Facet {
   Eigen::Vector3d normal() const { return (corner[1] - corner[0]).cross(corner[2] - corner[0]); }
 };
 
-/// Returns the parameter, from 0 at `from` to 1 at `to`, at which the segment meets the triangle, its border
-/// included with a tolerance; −1 if it does not, or lies in the triangle's plane. All in voxels. (Möller &
-/// Trumbore 1997)
+/// Returns the parameter, from 0 at `from` to 1 at `to`, at which the segment intersects the triangle, its
+/// boundary included with a tolerance; −1 if it does not, or lies in the triangle's plane. All in voxels.
+/// (Möller & Trumbore 1997)
 inline double meeting(const Eigen::Vector3d& from, const Eigen::Vector3d& to, const Facet& t) {
   const Eigen::Vector3d way = to - from, e1 = t.corner[1] - t.corner[0], e2 = t.corner[2] - t.corner[0];
   const Eigen::Vector3d p = way.cross(e2);

@@ -346,7 +346,7 @@ void TriangleBins::choose_slabs() {
   for (const auto& [layer, count] : layers[axis_]) {
     filed += count;
     left -= count;
-    // A slab is at least as thick as triangles reach, so that only its neighbours matter to it.
+    // A slab is at least as thick as triangles reach, so only its neighbours matter to it.
     if (left == 0 || filed < share || layer + 1 - begin < rings_) continue;
     slabs_.push_back({.end = begin = layer + 1, .bins = {}, .files = {}});
     filed = 0;
@@ -437,8 +437,8 @@ std::size_t TriangleBins::bytes_in_memory() const {
   return bytes;
 }
 
-/// Returns the files of a bin for this thread only, made on its first query. They serve few queries, so that
-/// the triangles stay in the mesh's order, in which clusters are often compact, too.
+/// Returns the files of a bin for this thread only, made on its first query. They serve few queries, so the
+/// triangles stay in the mesh's order, in which clusters are often compact, too.
 const TriangleBins::Files& TriangleBins::own_files(std::uint32_t bin) const {
   std::unordered_map<std::uint32_t, Files>& cache = cache_.local();
   const auto known = cache.find(bin);

@@ -42,8 +42,8 @@ inline Bounds cells_around(const BlockAt& block, double margin) {
 inline constexpr std::size_t kClusterSize = 16;
 
 /// The box of the small triangles of a bin, in sixteenths of a voxel from three voxels before the bin's
-/// first, rounded outwards. A small triangle reaches at most two voxels beyond its bin, so that eight bits
-/// are enough.
+/// first, rounded outwards. A small triangle reaches at most two voxels beyond its bin, so eight bits are
+/// enough.
 using BinBounds = BoundsOf<std::uint8_t>;
 
 /// The triangles of a soup by the blocks of voxels that they can be near.
@@ -69,7 +69,7 @@ class TriangleBins {
   void for_each_cluster(const BlockAt& block, F&& f) const {
     for_each_cluster(block, around(block, reach_), f);
   }
-  /// Calls f(cluster) for the clusters that may meet the box `near`, which is within reach of the block's
+  /// Calls f(cluster) for the clusters that may overlap the box `near`, which is within reach of the block's
   /// voxels. A smaller box needs fewer clusters.
   template <class F>
   void for_each_cluster(const BlockAt& block, const Bounds& near, F&& f) const;

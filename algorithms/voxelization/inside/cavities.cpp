@@ -15,7 +15,7 @@ namespace {
 using Eigen::Vector3d;
 using Neighbours = std::vector<std::set<std::uint32_t>>;  // by region
 
-/// How far a winding number may be from a whole number: far above its error, which is below 0.01.
+/// Largest deviation of a winding number from an integer: far above its error, which is below 0.01.
 constexpr double kWhole = 0.1;
 /// The largest region, in voxels, that is taken for a fold of the surface if it touches the outside.
 constexpr int kLargestFold = 64;

@@ -11,7 +11,7 @@ namespace {
 
 using Eigen::Vector3d;
 
-/// Blocks and triangles that are kept at most: some megabytes. Where sheets intersect, a block may hold
+/// Largest numbers of stored blocks and triangles: a few megabytes. Where sheets intersect, a block may hold
 /// thousands of triangles, and filing them again costs more than the queries.
 constexpr std::size_t kMostBlocks = 256, kMostObstacles = 20000;
 
@@ -67,7 +67,7 @@ class Obstacle {
   double offset_, slack_;
 };
 
-/// Calls f(cell) for the cells that the box of a segment meets, while it returns true. Returns true if all
+/// Calls f(cell) for the cells that the box of a segment overlaps, while it returns true. Returns true if all
 /// calls did.
 template <class F>
 bool all_cells(const Vector3d& from, const Vector3d& to, F&& f) {
@@ -128,7 +128,7 @@ CellObstacles::CellObstacles(const IndexSoup& soup, const TriangleBins& bins) : 
 CellObstacles::~CellObstacles() = default;
 CellObstacles::CellObstacles(CellObstacles&&) noexcept = default;
 
-/// Returns the block that contains a cell, and files its triangles if they are not kept.
+/// Returns the block that contains a cell, and collects its triangles if they are not stored.
 CellObstacles::Block& CellObstacles::block_of(const Voxel& cell) {
   const BlockAt at = tile_of(cell);
   if (last_ && at == last_at_) return *last_;
@@ -156,7 +156,7 @@ bool CellObstacles::is_free_in(const Voxel& cell, const Vector3d& from, const Ve
     const Obstacle& obstacle = block.obstacles[i->index];
     if (obstacle.meeting(from, to) < 0) continue;
     last_met_ = obstacle.facet();
-    // The next segment often meets the same obstacle, so it is moved to the front.
+    // The next segment often intersects the same obstacle, so it is moved to the front.
     std::rotate(entries.begin(), i, i + 1);
     return false;
   }

@@ -1,4 +1,4 @@
-// Triangles that segments of some voxels meet.
+// Triangles that intersect segments a few voxels long.
 #pragma once
 
 #include <Eigen/Geometry>
@@ -23,18 +23,18 @@ class CellObstacles {
   ~CellObstacles();
   CellObstacles(CellObstacles&&) noexcept;
 
-  /// Returns true if no triangle that touches the cell meets the segment, which lies in the cell.
+  /// Returns true if no triangle that touches the cell intersects the segment, which lies in the cell.
   bool is_free_in(const Voxel& cell, const Eigen::Vector3d& from, const Eigen::Vector3d& to);
-  /// Returns true if no triangle meets the segment.
+  /// Returns true if no triangle intersects the segment.
   bool is_free(const Eigen::Vector3d& from, const Eigen::Vector3d& to);
 
-  /// A triangle that a segment meets.
+  /// A triangle that a segment intersects.
   struct Met {
     double part = 1.0;        ///< of the segment, up to the triangle; 1 if none is met
     bool faces_from = false;  ///< the triangle is wound counter-clockwise seen from the segment's start
     std::uint32_t triangle = 0;
   };
-  /// Returns the first triangle that the segment meets; of several at one point the one with the least
+  /// Returns the first triangle that the segment intersects; of several at one point the one with the least
   /// number.
   Met first_met(const Eigen::Vector3d& from, const Eigen::Vector3d& to);
 
@@ -53,8 +53,8 @@ class CellObstacles {
   std::map<BlockAt, std::unique_ptr<Block>> blocks_;
   Block* last_ = nullptr;  ///< the block of the last query
   BlockAt last_at_{};
-  Facet last_met_{TriangleCorners{}};  ///< the triangle met last, which the next segment often meets as well
-  std::size_t obstacles_ = 0;  ///< number of triangles in `blocks_`, each counted in every block that has it
+  Facet last_met_{TriangleCorners{}};  ///< the last one found, which the next segment often intersects, too
+  std::size_t obstacles_ = 0;          ///< number of triangles in `blocks_`, each counted once per block
   std::size_t work_ = 0;
 };
 

@@ -13,8 +13,7 @@ namespace hermesh {
 /// Joins pockets to the outside: regions of at most 64 voxels in a crevice narrower than a voxel, to which no
 /// path along grid edges leads. They are
 /// - those with a voxel from which a segment of at most six voxels along each axis leads to the outside, or
-/// to a
-///   region joined before, without meeting a triangle;
+///   to a region joined before, without intersecting a triangle;
 /// - those from which a path along the walls of the crevice, from triangle to triangle, leads there. These
 /// are
 ///   searched one region after another until a fixed number of triangles has been tested; later regions stay
@@ -31,8 +30,8 @@ void open_pockets(const IndexSoup& soup, const TriangleBins& bins, const std::ve
 
 /// Joins cavities to the outside, as open_pockets() does. A region is a cavity if a closed shell of faces
 /// that agree and face inwards goes around it, its winding number is 0, and that of every region next to it
-/// is 1, so that there is a wall with samples all around it. Other voids, which parts of a model enclose
-/// between them, stay filled. A note names the first void within an inward shell that stays filled.
+/// is 1, so there is a wall with samples all around it. Other voids, which parts of a model enclose between
+/// them, stay filled. A note names the first void within an inward shell that stays filled.
 /// @param winding called only if there may be a cavity
 /// @throws Cancelled
 void open_cavities(const IndexSoup& soup, const TriangleBins& bins, const Band& band,

@@ -31,7 +31,7 @@ constexpr double kNearby = 1e-5;
 /// Each takes some microseconds.
 constexpr std::size_t kMostFaces = 1 << 17, kFacesPerSample = 1, kFacesPerTriangle = 16;
 /// How far off a face the segments to voxels start, in voxels: beyond rounding and beyond doubled faces, but
-/// in a narrow face nearer than its border.
+/// in a narrow face nearer than its boundary.
 constexpr double kMostOff = 1e-3, kLeastOff = 1e-5;
 /// A face of this size, in voxels, is searched from one point only.
 constexpr double kSmallFace = 0.5;
@@ -116,8 +116,8 @@ class Prober {
         suspicion_(suspects, band, bins.blocks()) {}
 
   /// Finds the spaces on the two sides of a face. All points of a whole face have the same spaces next to
-  /// them, so that one that sees a voxel is enough. All points of a face that is not whole have to agree that
-  /// it is inner.
+  /// them, so one that sees a voxel is enough. All points of a face that is not whole have to agree that it
+  /// is inner.
   void look(const TriangleFace& face, const Vector3d& normal, Sheet& sheet) {
     if (!suspicion_.touches(face.corners)) {
       sheet.space = Space::outer;
@@ -189,7 +189,7 @@ struct InnerEdge {
     const Vector3d low(voxel[0], voxel[1], voxel[2]);
     return {low, low + Vector3d::Unit(axis)};
   }
-  /// Appends the point where a triangle meets the edge, if it does.
+  /// Appends the point where a triangle intersects the edge, if it does.
   void meet(const Facet& facet) {
     const Bounds edge = box();
     if (((facet.low() - edge.upper).array() > kNearby).any() ||
@@ -498,7 +498,7 @@ class Finder {
     }
     if (doubtful.empty() || inner_triangles == 0) return;
     constexpr std::size_t kTheRule = 4;  // inner triangles to a doubtful one, or inner area to doubtful area
-    constexpr std::size_t kFew = 5000, kSmallModel = 50'000;  // some tenths of a second
+    constexpr std::size_t kFew = 5000, kSmallModel = 50'000;  // a few tenths of a second
     // Nearly all large triangles have doubtful parts along the edges of parts, however little these are.
     const bool little_doubt = doubtful.size() <= kFew || inner_area >= double(kTheRule) * doubtful_area;
     const bool quick = little_doubt && soup_.size() <= kSmallModel;

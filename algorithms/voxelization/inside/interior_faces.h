@@ -24,9 +24,9 @@ struct InteriorFaces {
 /// Finds the triangles, or parts of them, with the solid on both sides. Triangles near suspicious voxels are
 /// cut along the lines in which others, or caps, cross them. A part between these lines counts as inner only
 /// if that is certain: from just off either of its sides a free segment leads to a voxel inside, or, where no
-/// voxel is seen, the winding number says so. All other parts stay. The work grows with the number of samples
-/// and triangles: where triangles cross one another more densely than once a sample, not all are cut along
-/// every line, their uncertain parts stay, and a note reports that.
+/// voxel is seen, the winding number decides so. All other parts stay. The work grows with the number of
+/// samples and triangles: where triangles cross one another more densely than once a sample, not all are cut
+/// along every line, their uncertain parts stay, and a note reports that.
 /// @param reach how far distances matter, in voxels
 /// @param voxel_size in world units
 /// @throws Cancelled.

@@ -329,11 +329,11 @@ class Orienter {
     flows.resize(count);
   }
 
-  /// Leaves out each patch that the others do not need: at every edge of its border two or more others meet,
-  /// and without it these run along the edge as often in one direction as in the other. So it is a wall
-  /// within the solid or a fin of no thickness, and bounds nothing. Of a solid that a wall divides, either
-  /// side and the wall would make a solid, too; the least area comes first, and no surface within the wall's
-  /// border has less than a plane one.
+  /// Leaves out each patch that the others do not need: at every edge of its boundary two or more others are
+  /// incident, and without it these run along the edge as often in one direction as in the other. So it is a
+  /// wall within the solid or a fin of no thickness, and bounds nothing. Of a solid that a wall divides,
+  /// either side and the wall would make a solid, too; the least area comes first, and no surface within the
+  /// wall's border has less than a plane one.
   void leave_out_walls(const std::vector<Patch>& patches, std::vector<std::int8_t>& turns) {
     if (shared_edges_.empty() || result_.non_manifold_edges > two_face_edges_) return;
     std::vector<std::uint32_t> patch_of(triangles_.size(), kNone);
@@ -357,7 +357,7 @@ class Orienter {
       return patches[a].given + patches[a].turned < patches[b].given + patches[b].turned;
     });
     for (const std::uint32_t p : order) {
-      // An edge of one face is the border of a hole, and the patch may be the rest of a solid.
+      // An edge of one face is the boundary of a hole, and the patch may be the rest of a solid.
       if (patches[p].has_boundary || !patches[p].orientable) continue;
       const auto [begin, end] = std::ranges::equal_range(flows, p, {}, &Flow::patch);
       // The others are closed along the border if the whole flow is the patch's own. A patch without such a

@@ -15,7 +15,7 @@ struct Orientation {
   enum class Verdict {
     usable,
     no_area,        ///< every face is degenerate
-    cancelling,     ///< most of the area exists with both windings, so that it bounds nothing
+    cancelling,     ///< most of the area exists with both windings, so it bounds nothing
     not_orientable  ///< most of the area belongs to patches with one side only, such as a Möbius strip
   };
 
@@ -34,8 +34,8 @@ struct Orientation {
 
 /// Orients the faces of a mesh so that they agree on which side is out. Points at equal positions count as
 /// one, so that soups work too. Of faces with the same three points one is used, in the winding of most, and
-/// the others are duplicates. If as many have one winding as the other, and the surface continues around
-/// them without them, none is used. Faces with two equal points stay as they are.
+/// the others are duplicates. If as many have one winding as the other, and the surface continues around them
+/// without them, none is used. Faces with two equal points are not changed.
 ///
 /// In each patch faces are flipped to agree, to the winding that more of its area was given with. If the
 /// volume of all patches together is then negative, for every apex in the mesh's box from which that of an

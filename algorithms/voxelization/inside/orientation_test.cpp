@@ -230,7 +230,7 @@ TEST(Orientation, LeavesOutAFinOfNoThickness) {
 }
 
 TEST(Orientation, TakesOneOfTwoFacesThatAreTheOnlyOnesThere) {
-  // Every face twice and wound at random, so that some cancel: no part of a wall, for the surface needs them.
+  // Every face twice and wound at random, so some cancel: no part of a wall, for the surface needs them.
   std::mt19937 random(1);
   for (int trial = 0; trial < 20; ++trial) {
     Soup box = cube(1);
@@ -280,7 +280,7 @@ TEST(Orientation, OfAnOpenPatchFollowsTheLargerArea) {
   EXPECT_EQ(most.turns[3], -1);
   EXPECT_EQ(most.turns[5], -1);
   EXPECT_EQ(most.boundary_edges, 4u);
-  // Once most of the area is inside out, so is the volume, and all is turned over.
+  // Once most of the area is inside out, so is the volume, and all faces are reversed.
   open.flip_all();
   EXPECT_EQ(open.orient().flipped, 8u);
 }
@@ -291,7 +291,7 @@ TEST(Orientation, LeavesAFlatSheetAlone) {
 }
 
 TEST(Orientation, TurnsNoSheetWhoseVolumeDependsOnThePlace) {
-  // A ridge of height 1 and a valley of depth 2 beside it, unit length in y. About an apex at height z the
+  // A ridge of height 1 and a valley of depth 2 next to it, unit length in y. About an apex at height z the
   // cone to the ridge has volume (2 − 2z)/3, to the valley (−4 − 2z)/3, together (−2 − 4z)/3: from 2 at the
   // valley's bottom to −2 at the ridge's top, and −0.11 about the centre of the area at −0.42.
   Soup sheet;

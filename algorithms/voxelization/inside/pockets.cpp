@@ -15,20 +15,20 @@ namespace {
 
 using Eigen::Vector3d;
 
-/// A region of more voxels than this is no pocket.
+/// A region of more voxels than this is not a pocket.
 constexpr int kLargestPocket = 64;
 /// Length of the segments, in voxels along each axis: in a slit far narrower than a voxel, the next voxel may
 /// be some voxels away.
 constexpr std::int32_t kFar = 6;
 /// Most pockets open by segments of at most this length, which are searched first because they cost far less.
 constexpr std::int32_t kNearFirst = 2;
-/// The most triangles that are tested for the paths along walls of all pockets together: some tenths of a
+/// The most triangles that are tested for the paths along walls of all pockets together: a few tenths of a
 /// second. Many thousands of pockets are not crevices, but spaces between intersecting parts of a model.
 constexpr std::size_t kMostWork = 20'000'000;
-/// The test misses a triangle in whose plane a segment lies, so that a second segment is moved by this.
+/// The test misses a triangle in whose plane a segment lies, so a second segment is moved by this.
 const Vector3d kAside(1.1e-5, 1.7e-5, 2.3e-5);
 
-/// A region of few voxels that the flood from infinity did not reach.
+/// A small region that the flood from infinity did not reach.
 struct Pocket {
   std::uint32_t region = 0;
   std::vector<Voxel> voxels;

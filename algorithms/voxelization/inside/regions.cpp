@@ -137,8 +137,8 @@ class Hierarchy {
   std::uint32_t root(std::uint32_t component) { return sets_.find(levels_[0].node + component); }
 
  private:
-  /// Adds the level above the coarsest one. Returns true if it has only the eight blocks around zero, so that
-  /// only infinity is beyond.
+  /// Adds the level above the coarsest one. Returns true if it has only the eight blocks around zero, so only
+  /// infinity is beyond.
   bool add_level() {
     const BlockTable& below = *levels_.back().table;
     std::vector<BlockSet> set(1);

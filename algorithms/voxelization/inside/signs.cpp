@@ -104,8 +104,8 @@ Signs find_signs(const IndexSoup& soup, SignRule rule, const TriangleBins& bins,
   };
   if (rule != SignRule::winding_number) {
     if (is_automatic) flood_from_infinity();
-    // Pockets only enlarge the outside, so that the flood leaks with them if it leaks without them; there may
-    // be thousands.
+    // Pockets only enlarge the outside, so the flood leaks with them if it leaks without them; there may be
+    // thousands.
     if (!leaks) {
       open_pockets(soup, bins, band.blocks, regions, context);
       if (is_automatic) open_cavities(soup, bins, band, wound, regions, context);

@@ -32,10 +32,10 @@ Signs find_signs(const IndexSoup& soup, SignRule rule, const TriangleBins& bins,
                  double reach, RunContext& context);
 
 /// Finds the sides by the generalised winding number: inside is where `winding` is above ½. It changes by a
-/// whole number at a triangle and smoothly elsewhere, so that most blocks need a single evaluation for each
-/// of their components. Where neighbouring components disagree or the number is near ½, as around a hole,
-/// every voxel is evaluated; the surface of the value ½ across the hole is followed through space without
-/// blocks and returned as the caps.
+/// whole number at a triangle and smoothly elsewhere, so most blocks need a single evaluation for each of
+/// their components. Where neighbouring components disagree or the number is near ½, as around a hole, every
+/// voxel is evaluated; the surface of the value ½ across the hole is followed through space without blocks
+/// and returned as the caps.
 /// @param regions find_regions() of the table's blocks
 /// @param open false if the surface is closed, so that no boundaries of holes are searched
 /// @param reach how far distances matter, in voxels

@@ -16,7 +16,7 @@ constexpr double kOnPlane = 1e-7;
 /// A triangle that ends this near to another one, in voxels, divides the space next to it: kMostOff of
 /// interior_faces.cpp.
 constexpr double kTouchingPlane = 1e-3;
-/// A strip along a face's border no wider than this, in voxels, is not cut off.
+/// A strip along a face's boundary no wider than this, in voxels, is not cut off.
 constexpr double kBorder = 1e-6;
 
 /// Returns twice the area of a triangle, positive if counter-clockwise.
@@ -62,7 +62,7 @@ std::vector<FaceSide> sides_of(const std::vector<FacePlace>& corners) {
 }
 
 /// Clips a cut to its part within a convex polygon (Cyrus & Beck 1978). Returns false if that is a point, or
-/// on the border.
+/// on the boundary.
 bool clip(const std::vector<FaceSide>& sides, FaceCut& cut) {
   double begin = 0, end = 1;
   for (const FaceSide& side : sides) {

@@ -12,7 +12,7 @@ using Eigen::Vector3d;
 
 const Facet kTriangle({0, 0, 0}, {4, 0, 0}, {0, 4, 0});
 
-/// An upright triangle in the plane x = `x`, which meets the plane z = 0 from y = `from` to `to`.
+/// An upright triangle in the plane x = `x`, which intersects the plane z = 0 from y = `from` to `to`.
 Facet upright(double x, double from, double to, double lowest = -5) {
   return {{x, from, lowest}, {x, 2 * to - from, lowest}, {x, from, -lowest}};
 }

@@ -10,13 +10,13 @@ namespace hermesh {
 
 /// A walk over points 1e-5 voxels above the sides of triangles, each reached from the walk's start without
 /// meeting a triangle: over the edges that triangles share, and straight across to the opposite wall. No path
-/// leads around the border of a hole. Needs neither normals that agree nor a closed mesh.
+/// leads around the boundary of a hole. Needs neither consistent normals nor a closed mesh.
 class WallWalk {
  public:
   /// Keeps references; the obstacles count the walk's queries as work.
   WallWalk(const IndexSoup& soup, CellObstacles& obstacles) : soup_(soup), obstacles_(obstacles) {}
 
-  /// Adds a start: the point where the segment from `from` by `step` first meets a triangle, if it does.
+  /// Adds a start: the first point where the segment from `from` by `step` intersects a triangle, if any.
   void begin(const Eigen::Vector3d& from, const Eigen::Vector3d& step);
   /// Returns the next point, each once, in the order in which they are reached; nothing after the last one.
   std::optional<Eigen::Vector3d> next();

@@ -21,7 +21,7 @@ PolygonMesh box() {
 
 bool is_inside(const Vector3d& p) { return p.cwiseAbs().maxCoeff() < 2.4; }
 
-/// Returns the points of a walk that begins where the segment meets the mesh.
+/// Returns the points of a walk that begins where the segment intersects the mesh.
 std::vector<Vector3d> walk(const PolygonMesh& mesh, const Vector3d& from, const Vector3d& way) {
   RunContext context;
   const IndexSoup soup(mesh, 1.0);

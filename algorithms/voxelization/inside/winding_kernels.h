@@ -8,7 +8,7 @@
 namespace hermesh::winding {
 
 /// Points relative to an origin near them, in voxels, and the sum of solid angles at each, 4π for once
-/// around. Every point has its own sum, so that the bits do not depend on the number of lanes.
+/// around. Every point has its own sum, so the bits do not depend on the number of lanes.
 struct Targets {
   const float *x, *y, *z;
   float* solid_angle;
@@ -17,8 +17,8 @@ struct Targets {
 
 /// Field of the triangles in a box, seen from afar: their area vectors n and the distances u from the box's
 /// centre integrated up to second order, for a radius of 1 (Barill et al., Fast Winding Numbers for Soups and
-/// Clouds, ACM TOG 37(4), 2018, equations 7–9). The field is harmonic, so that symmetric tensors without
-/// traces are sufficient.
+/// Clouds, ACM TOG 37(4), 2018, equations 7–9). The field is harmonic, so symmetric tensors without traces
+/// are sufficient.
 struct Multipole {
   float radius = -1;  ///< in voxels, of a sphere about the box's centre that holds the triangles; −1: empty
   float first[3]{};   ///< ∫ n

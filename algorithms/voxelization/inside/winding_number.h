@@ -14,12 +14,12 @@ namespace hermesh {
 
 /// Hierarchical evaluation (Barill et al., Fast Winding Numbers for Soups and Clouds, ACM TOG 37(4), 2018):
 /// boxes far away by their multipoles up to second order, triangles nearby by their exact solid angles.
-/// Refers to the tree and to `turns`, which must outlive it; takes about 13 bytes a triangle. Queries may run
-/// in parallel. The error against the exact sum stays below 0.01, most often far below.
+/// Refers to the tree and to `turns`, which must outlive it; takes about 13 bytes per triangle. Queries may
+/// run in parallel. The error against the exact sum stays below 0.01, most often far below.
 class WindingNumber {
  public:
   /// @param tree the triangles
-  /// @param turns for each triangle 1 as given, −1 turned over, 0 left out (Orientation::turns); empty: all 1
+  /// @param turns for each triangle 1 as given, −1 reversed, 0 left out (Orientation::turns); empty: all 1
   explicit WindingNumber(const TriangleTree& tree, std::span<const std::int8_t> turns = {});
 
   /// Returns the number at a point in voxels relative to the mesh's origin. On a triangle, one of the values

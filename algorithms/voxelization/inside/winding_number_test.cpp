@@ -194,7 +194,7 @@ TEST(WindingNumber, IsExactToAHundredthOnSoups) {
 }
 
 TEST(WindingNumber, TakesLargeTrianglesInDoublePrecision) {
-  // A block beside the face of a box 2e6 voxels wide, with samples 1e-3 voxels from it.
+  // A block next to the face of a box 2e6 voxels wide, with samples 1e-3 voxels from it.
   Soup box;
   for (int i = 0; i < 8; ++i)
     box.points.push_back(1e6f * Eigen::Vector3f(i & 1 ? 1 : -1, i & 2 ? 1 : -1, i & 4 ? 1 : -1));
@@ -236,7 +236,7 @@ TEST(WindingNumber, IsTheSameForEveryNumberOfThreads) {
 
 TEST(WindingNumber, IsTheSameAtAnyLevelOfVectorCode) {
   Soup soup = random_soup(3000, 1, 7);
-  soup.add(icosphere(40, 0));  // its triangles are large beside a block
+  soup.add(icosphere(40, 0));  // its triangles are large compared with a block
   const std::vector<Eigen::Vector3d> points = block_at({3, -2, 5});
   std::vector<std::vector<float>> values;
   const TriangleTree tree(soup.points, soup.triangles, 1.0);

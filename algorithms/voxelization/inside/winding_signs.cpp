@@ -17,7 +17,7 @@ namespace hermesh {
 namespace {
 
 /// All voxels of a component are evaluated if its winding number is this near ½. The number of a component
-/// next to a closed surface is whole except for 0.01, so that only holes are within.
+/// next to a closed surface is whole except for 0.01, so only holes are within.
 constexpr float kDoubt = 0.25f;
 /// Voxels whose number is this near ½, twice its error, are evaluated more finely.
 constexpr float kError = 0.02f;
@@ -102,7 +102,7 @@ class WindingSigns {
   bool side(std::uint32_t component) const { return value_[component] > 0.5f; }
 
   /// Returns true if a component of a block is on both sides of a triangle, as around the boundary of a hole:
-  /// the number changes within the component, so that one voxel does not represent it.
+  /// the number changes within the component, so one voxel does not represent it.
   bool goes_round(std::uint32_t block, std::uint32_t component) const {
     const BlockMask& voxels = regions_.components[component].voxels;
     for (int axis = 0; axis < 3; ++axis)
@@ -327,7 +327,7 @@ class WindingSigns {
   }
 
   /// Signs the blocks around the evaluated ones, which distances to caps reach: each that was not evaluated
-  /// itself is on one side of the surface, so that one of its voxels represents all.
+  /// itself is on one side of the surface, so one of its voxels represents all.
   void sign_beyond(int rings, std::map<BlockAt, BlockMask>& beyond) const {
     for (const auto& [block, asked] : asked_) {
       context_.check();

@@ -44,7 +44,7 @@ bool leaves_out_inner_polygons(const Voxelizer& voxelizer);
 /// units. Empty if nothing is lost.
 std::string lost_surface_note(const LostSurface& lost, double voxel_size);
 
-/// Adds the figures `lost_surface_share` and `lost_surface_thickness` of a voxelizer's level set to the
+/// Adds the statistics `lost_surface_share` and `lost_surface_thickness` of a voxelizer's level set to the
 /// context, and the note if something is lost. @throws Cancelled
 void note_lost_surface(const PolygonMesh& mesh, const LevelSet& level_set, const Voxelizer& voxelizer,
                        RunContext& context);

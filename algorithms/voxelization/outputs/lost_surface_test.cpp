@@ -50,7 +50,7 @@ TEST(LostSurface, AGapBetweenSamplesIsLost) {
   EXPECT_NEAR(lost.thickness, 0.4, 1e-5);
 }
 
-/// The walls of the overlap bound nothing, so that nothing of the solid is lost with them.
+/// The walls of the overlap bound nothing, so nothing of the solid is lost with them.
 TEST(LostSurface, WallsWithinTheSolidDoNotCount) {
   PolygonMesh mesh = box({0.0, 0.0, 0.0}, {20.0, 10.0, 10.0});
   append(mesh, box({15.0, 0.0, 0.0}, {40.0, 10.0, 10.0}));

@@ -81,7 +81,7 @@ openvdb::FloatGrid::Ptr make_fog(const openvdb::FloatGrid& sdf, const VoxelizeOp
         // Exactly 1 beyond the band, where division might give a little less.
         if (distance <= -inner) return 1.0f;
         if (distance < 0.0f && distance >= -on_surface)
-          distance = 0.0f;  // a sample on the surface, which is no depth
+          distance = 0.0f;  // a sample on the surface, which has no depth
         return std::clamp((outer - distance) / (outer + inner), 0.0f, 1.0f);
       },
       [](float density, bool) { return density > 0.0f; });

@@ -48,12 +48,11 @@ struct VolumeOutputs {
   /// (vec3d), so
   ///   that far from the world's origin no more is lost than the mesh lost;
   /// - each attribute under its name ("attribute-NAME" if an output of the voxelizer is called NAME): floats
-  /// of points
-  ///   and corners with the closest point's barycentric weights, whole numbers from the corner with the
+  ///   of points and corners with the closest point's barycentric weights, integers from the corner with the
   ///   largest weight, those of polygons unchanged. One component becomes a float or int32 grid, two a vec3s
   ///   grid whose z is 0, three a vec3s grid, and four a vec3s grid and a float grid "NAME-alpha". Normals (3
   ///   components, name "normal" or ending in "-normal") get unit length; if they cancel, the triangle's own
-  ///   is used. Labels become metadata "label_0", …. Backgrounds are 0, and −1 for whole numbers.
+  ///   is used. Labels become metadata "label_0", …. Backgrounds are 0, and −1 for integers.
   std::vector<openvdb::GridBase::Ptr> grids;
   std::optional<FloatHermite> hermite;
   std::size_t active_voxels = 0;  ///< number of the band's active voxels

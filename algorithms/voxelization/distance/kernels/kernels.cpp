@@ -12,13 +12,13 @@ using namespace simd;
 /// A triangle whose height is below this, in voxels, is replaced by its longest side: the distance errs by no
 /// more, and its normal would be noise.
 constexpr double kThin = 1e-6;
-/// A grid line that passes a triangle's border this near, in voxels, counts as crossing it. Far above the
-/// rounding of double precision at any coordinate of a grid, far below any visible distance.
+/// A grid line that passes this close to a triangle's boundary, in voxels, counts as intersecting it. Far
+/// above the rounding of double precision at any coordinate of a grid, far below any visible distance.
 constexpr double kOn = 1e-9;
 
 // ---- Grid edges that triangles cross.
 
-/// Whole numbers of 0 … most within [low − kOn, high + kOn].
+/// Integers of 0 … most within [low − kOn, high + kOn].
 struct Range {
   int from, to;
   Range(double low, double high, int most) {
@@ -36,7 +36,7 @@ struct Range {
   bool empty() const { return from > to; }
 };
 
-/// Marks the edge at `t` along the axis on grid line (u, v), and both if t is a whole number within the
+/// Marks the edge at `t` along the axis on grid line (u, v), and both if t is an integer within the
 /// tolerance.
 inline void mark(EdgeBits& bits, int axis, int u, int v, double t, double tolerance) {
   const Range edges(t - 1.0 - tolerance + kOn, t + tolerance - kOn, 7);
@@ -61,7 +61,7 @@ inline unsigned find_lines(const Corners& corners, int axis, int from, LineRange
   const Doubles8 on = eight(kOn);
   const Doubles8 low = larger(smaller(smaller(a, b), c) - on, eight(0.0));
   const Doubles8 high = smaller(larger(larger(a, b), c) + on, eight(8.0));
-  // Adding and subtracting 1.5 · 2⁵² rounds to a whole number; half a unit more or less rounds up or down. A
+  // Adding and subtracting 1.5 · 2⁵² rounds to an integer; half a unit more or less rounds up or down. A
   // value just beyond half may be rounded too far by one, which the exact test corrects.
   const Doubles8 shift = eight(6755399441055744.0);
   const Doubles8 first = ((low + eight(0.5 - 1e-12)) + shift) - shift,
@@ -104,8 +104,8 @@ void cross_lines(const EightPairs& pairs, unsigned there, int axis, EdgeBits& bi
   Doubles8 w[3], longest = eight(0.0);
   unsigned outside = 0;
   for (int i = 0; i < 3; ++i) {
-    // Opposite corner i. The sign is exactly opposite for the reversed edge, so that no line is outside of
-    // both triangles that share it.
+    // Opposite corner i. The sign is exactly opposite for the reversed edge, so no line is outside of both
+    // triangles that share it.
     const int a = (i + 1) % 3, b = (i + 2) % 3;
     w[i] = (u[a] - pairs.line_u) * (v[b] - pairs.line_v) - (v[a] - pairs.line_v) * (u[b] - pairs.line_u);
     const Doubles8 length = magnitude(u[b] - u[a]) + magnitude(v[b] - v[a]);
@@ -117,8 +117,8 @@ void cross_lines(const EightPairs& pairs, unsigned there, int axis, EdgeBits& bi
   if (!inside) return;
   const Doubles8 low = smaller(smaller(t[0], t[1]), t[2]), high = larger(larger(t[0], t[1]), t[2]);
   const Doubles8 met = (w[0] * t[0] + w[1] * t[1] + w[2] * t[2]) / (w[0] + w[1] + w[2]);
-  // A line that only grazes the triangle within the tolerance may meet the plane anywhere. Rounding of an
-  // edge function, some 1e-15 longest², moves the hit by its share of the area.
+  // A line that only touches the triangle within the tolerance may intersect the plane anywhere. Rounding of
+  // an edge function, some 1e-15 longest², moves the hit by its share of the area.
   alignas(64) double hit[8], tolerance[8], line_u[8], line_v[8];
   store(hit, smaller(larger(met, low), high));
   store(tolerance, on + eight(4e-15) * longest * longest / size * (high - low));
@@ -296,7 +296,7 @@ struct CentreValues {
   alignas(64) float height[32], across[3][32], along[3][32];
 };
 
-/// Lowers the distances of a block's voxels by one triangle. The functions are linear, so that each is one
+/// Lowers the distances of a block's voxels by one triangle. The functions are linear, so each is one
 /// addition per voxel: the value at the block's centre plus that of the lane.
 template <bool ids>
 inline void update_block(const CentreValues& centre, const Functions& lane, const Broadcast& t, int block,
@@ -519,7 +519,7 @@ int nearest_batch(const LazyBatches& lazy, const Floats16* place, int guess, flo
     if (!near) continue;
     alignas(64) float bounds[16];
     store(bounds, bound);
-    // `best` decreases from batch to batch, so that each bound is checked again before its batch is searched.
+    // `best` decreases from batch to batch, so each bound is checked again before its batch is searched.
     for (; near; near &= near - 1) {
       const int i = __builtin_ctz(near);
       if (bounds[i] < best && lower(prepared(lazy, first + i), place, best) >= 0) nearest = first + i;
@@ -592,7 +592,7 @@ inline void look_around(const LazyBatches& lazy, const Floats16* place, float fr
 /// Searches block by block of 16 voxels, so that a batch serves all voxels of a block while it is in the
 /// cache.
 void update_from_many(const LazyBatches& lazy, float reach, bool ids, Distances& distances) {
-  // The previous block is adjacent, so that its nearest batch is a good first guess.
+  // The previous block is adjacent, so its nearest batch is a good first guess.
   int guess = -1;
   for (int block = 0; block < 32; ++block) {
     Floats16 centre[3];

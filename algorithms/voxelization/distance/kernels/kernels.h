@@ -44,7 +44,7 @@ struct Near {
 ///   along   e·x, from `low` to `high` on the edge
 /// so that d² = height² + (all across < 0 ? 0 : min over edges of across² + (along − clamp(along, low,
 /// high))²). A triangle thinner than a millionth of a voxel is its longest side, a segment, whose three edges
-/// are the same one seen from both sides, so that nothing is inside.
+/// are the same one seen from both sides, so nothing is inside.
 struct Batch {
   enum { kHeight = 0, kEdge = 4, kPerEdge = 9, kAlong = 4, kLow = 7, kHigh = 8, kFloats = 31 };
   alignas(64) float f[kFloats][kBatch];

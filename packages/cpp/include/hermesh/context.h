@@ -23,8 +23,8 @@ class Context {
   /// exception that it throws ends the work, and the call throws it instead of Cancelled.
   std::function<void(std::string_view stage, double fraction)> on_progress;
 
-  /// Stops the call, which throws Cancelled within some tens of milliseconds. May be called from on_progress,
-  /// from another thread and from a signal handler, and holds for later calls until reset().
+  /// Stops the call, which throws Cancelled within a few tens of milliseconds. May be called from
+  /// on_progress, from another thread and from a signal handler, and holds for later calls until reset().
   void cancel() noexcept { cancelled_.store(true, std::memory_order_relaxed); }
   bool cancelled() const noexcept { return cancelled_.load(std::memory_order_relaxed); }
   /// Withdraws the cancellation.

@@ -50,7 +50,7 @@ class HERMESH_API Mesh {
   /// @param triangles three numbers of points each, from 0
   /// @param quads four numbers each
   /// @param attributes each with a name of its own
-  /// @throws Error for an array whose size is no multiple of 3 (or 4), an index out of range, a coordinate
+  /// @throws Error for an array whose size is not a multiple of 3 (or 4), an index out of range, a coordinate
   /// that is not finite, points in double precision whose box does not fit single precision about an origin
   /// of its own, and an attribute whose number of values does not fit.
   explicit Mesh(std::span<const float> points, std::span<const std::uint32_t> triangles,
@@ -87,16 +87,16 @@ class HERMESH_API Mesh {
   std::shared_ptr<const Arrays> arrays_;
 };
 
-/// Reads PLY (ASCII, binary), OBJ, OFF (text, binary), STL, glTF 2.0 or 3MF, each also gzipped. The ending of
-/// the name gives the format. Polygons of more corners are split into triangles. Adds a note for each
+/// Reads PLY (ASCII, binary), OBJ, OFF (text, binary), STL, glTF 2.0 or 3MF, each also gzipped. The extension
+/// of the name gives the format. Polygons of more corners are split into triangles. Adds a note for each
 /// tolerated fault. With `attributes` those of PLY and OBJ are read, too.
 /// @throws Error for a file that is missing, damaged, of another type or without polygons; Cancelled.
 HERMESH_API Mesh read_mesh(const std::filesystem::path& path, Context& context, bool attributes = false);
 
-/// Writes PLY (binary), OBJ, OFF, STL, glTF (.glb, .gltf) or 3MF, by the ending of the name, in an atomic
-/// way. The file has the same points, except for STL, which has single precision; a note gives the loss. Only
-/// PLY stores attributes.
-/// @throws Error for an unknown ending or a path that cannot be written; Cancelled.
+/// Writes PLY (binary), OBJ, OFF, STL, glTF (.glb, .gltf) or 3MF, by the extension of the name, atomically.
+/// The file has the same points, except for STL, which has single precision; a note gives the loss. Only PLY
+/// stores attributes.
+/// @throws Error for an unknown extension or a path that cannot be written; Cancelled.
 HERMESH_API void write_mesh(const std::filesystem::path& path, const Mesh& mesh, Context& context);
 
 }  // namespace hermesh::HERMESH_V1

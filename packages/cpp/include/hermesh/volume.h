@@ -102,8 +102,8 @@ HERMESH_API Volume read_vdb(const std::filesystem::path& path, Context& context,
 /// Returns the names of the grids of a .vdb file. @throws Error as read_vdb().
 HERMESH_API std::vector<std::string> grid_names(const std::filesystem::path& path);
 
-/// Writes the volumes as the grids of one .vdb file, by their names, in an atomic way. The same volumes give
-/// the same bytes.
+/// Writes the volumes as the grids of one .vdb file, by their names, atomically. The same volumes give the
+/// same bytes.
 /// @throws Error for a path that cannot be written, and two volumes of one name; Cancelled.
 HERMESH_API void write_vdb(const std::filesystem::path& path, std::span<const Volume> volumes,
                            Context& context);
