@@ -11,16 +11,18 @@
 
 namespace hermesh {
 
-/// Sum over count; of at least one value.
+/// Returns the mean of at least one value.
 double mean(const std::vector<double>& values);
 
-/// Middle value; of an even number the mean of the two in the middle. 0 of none.
+/// Returns the middle value; for an even number of values the mean of the two in the middle; 0 if there are
+/// none.
 double median(std::vector<double> values);
 
 using StageSeconds = std::vector<std::pair<std::string, double>>;
 
-/// Median of every stage over the repetitions, in the order in which the stages first appear. A stage that
-/// runs several times in one repetition counts with its sum; one that a repetition lacks counts there as 0.
+/// Returns the median of every stage over the repetitions, in the order in which the stages first appear. A
+/// stage that runs several times in one repetition counts with its sum; one that a repetition lacks counts
+/// there as 0.
 StageSeconds median_stages(std::span<const StageSeconds> repetitions);
 
 /// Measures the peak of resident memory since construction, less the resident memory at construction. The
@@ -39,7 +41,7 @@ class PeakMemory {
 /// Seconds that `work` takes.
 double timed(const std::function<void()>& work);
 
-/// CPU seconds of the whole process so far, all threads, in the program and in the kernel.
+/// Returns the CPU seconds of the whole process so far, all threads, in the program and in the kernel.
 double process_cpu_seconds();
 
 /// One contender of an interleaved timing.

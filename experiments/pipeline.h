@@ -54,7 +54,8 @@ struct ExtractRecipe {
   bool written_in_single = false;
 };
 
-/// World units. 0 or not finite for a resolution of a mesh without extent, which voxelizers reject.
+/// Returns the voxel size in world units. 0 or not finite for a resolution of a mesh without extent, which
+/// voxelizers reject.
 double voxel_size_of(const VoxelizeRecipe& recipe, const PolygonMesh& mesh);
 VoxelizationInput voxelization_input(const PolygonMesh& mesh, const VoxelizeRecipe& recipe,
                                      RunContext& context);

@@ -6,8 +6,8 @@
 
 namespace hermesh {
 
-/// The mesh as triangles whose faces agree: where two triangles run along their common edge in the same
-/// direction, one of them is reversed, so that a patch keeps the winding of the larger part of its area.
+/// Returns the mesh as triangles whose faces agree: where two triangles run along their common edge in the
+/// same direction, one of them is reversed, so that a patch keeps the winding of the larger part of its area.
 /// Points with the same coordinates count as one. The list of points and the order of the triangles stay as
 /// they are.
 PolygonMesh with_agreeing_faces(const PolygonMesh& mesh);

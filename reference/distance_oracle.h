@@ -18,9 +18,9 @@ namespace hermesh {
 
 using Corners = std::array<Eigen::Vector3d, 3>;
 
-/// The mesh's triangles in the index coordinates of a grid whose samples lie at origin + voxel_size · (i, j,
-/// k): in voxels, relative to the mesh's origin. Triangles of no area are left out (exact predicate); their
-/// edges belong to their neighbours, too.
+/// Returns the mesh's triangles in the index coordinates of a grid whose samples lie at origin + voxel_size ·
+/// (i, j, k): in voxels, relative to the mesh's origin. Triangles of no area are left out (exact predicate);
+/// their edges belong to their neighbours, too.
 std::vector<Corners> triangles_in_voxels(const PolygonMesh& mesh, double voxel_size);
 
 /// Answers questions about the distance to a set of triangles, without approximation but slowly. All
@@ -35,13 +35,13 @@ class DistanceOracle {
 
   const std::vector<Corners>& triangles() const;
 
-  /// Distance to the nearest triangle, or the upper bound if that is smaller. A close bound makes the search
-  /// fast.
+  /// Returns the distance to the nearest triangle, or the upper bound if that is smaller. A close bound makes
+  /// the search fast.
   double distance(const Eigen::Vector3d& point,
                   double upper_bound = std::numeric_limits<double>::infinity()) const;
   /// Returns true if a triangle comes within a radius of a point.
   bool any_within(const Eigen::Vector3d& point, double radius) const;
-  /// The point of the triangles that is nearest to the given one.
+  /// Returns the point on the triangles that is nearest to the given one.
   Eigen::Vector3d nearest_point(const Eigen::Vector3d& point) const;
   /// Numbers of all triangles within a radius of a point.
   std::vector<std::uint32_t> triangles_within(const Eigen::Vector3d& point, double radius) const;
@@ -57,11 +57,11 @@ class DistanceOracle {
   };
   /// Casts rays from a point until they agree enough.
   Vote parity(const Eigen::Vector3d& point) const;
-  /// The signed number of triangles that the ray from a point along one of the nine directions (0 to 8)
-  /// crosses: +1 for each that it leaves by the front, the side that the triangle's normal points to, and −1
-  /// for each that it enters by the front.
+  /// Returns the signed number of triangles that the ray from a point along one of the nine directions (0 to
+  /// 8) crosses: +1 for each that it leaves by the front, the side that the triangle's normal points to, and
+  /// −1 for each that it enters by the front.
   int signed_crossings(const Eigen::Vector3d& point, int direction) const;
-  /// Direction 0 to 8 of the rays.
+  /// Returns direction `number`, 0 to 8, of the rays.
   static Eigen::Vector3d direction(int number);
 
   /// Origins, at multiples of 8, of the blocks of 8³ samples whose centre is no farther from the surface than
@@ -84,14 +84,14 @@ inline Eigen::Vector3d block_position(const std::array<int, 3>& origin, int i) {
 std::array<double, kBlockVoxels> block_distances(const DistanceOracle& oracle,
                                                  const std::array<int, 3>& origin, double reach);
 
-/// The point at which the side of sample i is evaluated: a few millionths of a voxel above the sample on
-/// every axis, most on x and least on z, so that a sample on a polygon belongs to the solid on the upper side
-/// of it.
+/// Returns the point at which the side of sample i is evaluated: a few millionths of a voxel above the sample
+/// on every axis, most on x and least on z, so that a sample on a polygon belongs to the solid on the upper
+/// side of it.
 Eigen::Vector3d block_side_place(const std::array<int, 3>& origin, int i);
 
-/// The samples of a block that lie inside. `is_inside` is called with block_side_place() of one sample of
-/// every set that provably lies on one side: the sign can change only across the surface, so two neighbours
-/// are on one side if their distances add up to more than the voxel between them.
+/// Returns the samples of a block that lie inside. `is_inside` is called with block_side_place() of one
+/// sample of every set that provably lies on one side: the sign can change only across the surface, so two
+/// neighbours are on one side if their distances add up to more than the voxel between them.
 std::bitset<kBlockVoxels> block_inside(const std::array<int, 3>& origin,
                                        const std::array<double, kBlockVoxels>& distances,
                                        const std::function<bool(const Eigen::Vector3d&)>& is_inside);

@@ -6,7 +6,7 @@
 
 namespace hermesh {
 
-/// Marching cubes, whose mesh OpenMesh then decimates. Options: `triangles`, the budget (0 = use the
+/// Runs marching cubes, and decimates the mesh by OpenMesh. Options: `triangles`, the budget (0 = use the
 /// fraction); `fraction` of marching cubes' own triangles; `normal_flip`, the largest turn of a triangle's
 /// normal in one collapse, in degrees (180 = any). OpenMesh collapses a point into a neighbour, so every
 /// point is one of marching cubes'. A collapse that would change the topology is not made: the mesh stays
@@ -14,7 +14,8 @@ namespace hermesh {
 /// @throws Cancelled; Error if OpenMesh cannot load the mesh
 PolygonMesh marching_cubes_decimated(const ExtractionInput& input);
 
-/// Only the decimation: quadric edge collapse to at most `budget` triangles, as far as the topology permits.
+/// Runs only the decimation: quadric edge collapse to at most `budget` triangles, as far as the topology
+/// permits.
 PolygonMesh decimate(const PolygonMesh& mesh, std::size_t budget, double normal_flip_degrees,
                      RunContext& context);
 

@@ -18,7 +18,8 @@ struct MeshingFrame {
   bool inside_is_above = false;
 };
 
-/// The frame of a grid. @throws Error for an isovalue, a background or a value in a leaf that is not finite
+/// Returns the frame of a grid. @throws Error for an isovalue, a background or a value in a leaf that is not
+/// finite
 MeshingFrame meshing_frame(const openvdb::FloatGrid& grid, double isovalue);
 
 }  // namespace hermesh

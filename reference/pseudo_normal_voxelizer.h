@@ -19,8 +19,8 @@ struct NearestPart {
   Eigen::Vector3d point;
   TrianglePart part;
 };
-/// The point of a triangle nearest to p, and the part that it lies on. A triangle without area has edges and
-/// corners alone.
+/// Returns the point of a triangle nearest to p, and the part that it lies on. A triangle without area has
+/// only edges and corners.
 NearestPart nearest_part(const Eigen::Vector3d& p, const std::array<Eigen::Vector3d, 3>& corners);
 
 /// The normals of all parts of a mesh, none of them of unit length. Points with the same coordinates are one.
@@ -45,10 +45,10 @@ class PseudoNormals {
   std::vector<Edge> edges_;  ///< in the order of their ends
 };
 
-/// The grid "sdf" of class level set: in each voxel the distance to the nearest triangle, exact except
-/// for rounding, with the sign that the pseudo-normal of its nearest part gives; negative inside. The voxels
-/// nearer than the band of their side are active. The signs are correct for closed, oriented polygons without
-/// self-intersection and unspecified for others. The bytes do not depend on the number of threads.
+/// Returns the grid "sdf" of class level set: in each voxel the distance to the nearest triangle, exact
+/// except for rounding, with the sign that the pseudo-normal of its nearest part gives; negative inside. The
+/// voxels nearer than the band of their side are active. The signs are correct for closed, oriented polygons
+/// without self-intersection and unspecified for others. The bytes do not depend on the number of threads.
 /// @throws Error if check_voxelization_fits() throws, and for a mesh whose triangles all have no area;
 /// Cancelled
 LevelSet pseudo_normal_voxelizer(const VoxelizationInput& input);

@@ -9,15 +9,16 @@
 
 namespace hermesh::test {
 
-/// Sphere about a centre: a subdivided octahedron of 8·4^levels triangles with its points on the sphere.
+/// Returns a sphere about a centre: a subdivided octahedron of 8·4^levels triangles with its points on the
+/// sphere.
 PolygonMesh sphere(double radius, int levels, const Eigen::Vector3d& centre = Eigen::Vector3d::Zero());
-/// Cube of six quads with edge 2·half, rotated by 20°, 30° and 40° about x, y and z.
+/// Returns a cube of six quads with edge length 2·half, rotated by 20°, 30° and 40° about x, y and z.
 PolygonMesh turned_cube(double half);
-/// The rotation of turned_cube().
+/// Returns the rotation of turned_cube().
 Eigen::Matrix3d turn();
-/// Torus about the z axis of 2·rings·sides triangles.
+/// Returns a torus of 2·rings·sides triangles about the z axis.
 PolygonMesh torus(double major, double minor, int rings, int sides);
-/// Two meshes as one; the second one's points are given relative to the first one's origin.
+/// Returns two meshes as one; the second one's points are converted to the first one's origin.
 PolygonMesh joined(const PolygonMesh& first, const PolygonMesh& second);
 /// Returns the mesh with all polygons reversed.
 PolygonMesh reversed(PolygonMesh mesh);
@@ -26,7 +27,7 @@ double signed_volume(const PolygonMesh& mesh);
 /// Returns true if every directed edge occurs exactly once, and its opposite exactly once: then the mesh is
 /// closed, edge-manifold and oriented.
 bool closed_and_oriented(const PolygonMesh& mesh);
-/// The number of points that polygons use, less that of edges, plus that of triangles.
+/// Returns the number of points that polygons use, minus that of edges, plus that of triangles.
 long euler_characteristic(const PolygonMesh& mesh);
 
 PolygonMesh extract(const std::string& extractor, const LevelSet& level_set,

@@ -14,7 +14,7 @@ struct Soup {
   double voxel_size = 1.0;  ///< world units
 };
 
-/// A soup of 100 to 10,000 triangles and 12 to 400 voxels along its longest side, which only the seed
+/// Returns a soup of 100 to 10,000 triangles and 12 to 400 voxels along its longest side, which only the seed
 /// determines, on every platform: triangles at random, balls that overlap, turned boxes, tori that cross
 /// themselves, spikes out of a middle, or sheets stacked closer than a voxel.
 Soup soup(std::uint64_t seed);

@@ -8,9 +8,9 @@
 
 namespace hermesh {
 
-/// Sum of all triangles' solid angles (van Oosterom and Strackee, 1983) over 4π: 1 inside a closed surface
-/// with its normals outwards, 0 outside, between them near the holes of an open one. The sum takes some ten
-/// nanoseconds per triangle.
+/// Returns the sum of all triangles' solid angles (van Oosterom and Strackee, 1983) over 4π: 1 inside a
+/// closed surface with its normals outwards, 0 outside, between them near the holes of an open one. The sum
+/// takes about ten nanoseconds per triangle.
 double winding_number(const std::vector<Corners>& triangles, const Eigen::Vector3d& point);
 
 /// Computes winding_number() sooner. The soup less a cone over its boundary (every edge as often as it is
@@ -22,9 +22,10 @@ class WindingOracle {
   /// Keeps a reference to the surface.
   explicit WindingOracle(const DistanceOracle& surface);
 
-  /// The soup's winding number at a point, with its sign reversed if the soup as a whole is inside out, that
-  /// is, if its volume is negative about every point of its box. The volume of an open soup depends on that
-  /// point; if even the sign of the volume does, as for a sheet, the winding is taken as it was given.
+  /// Returns the soup's winding number at a point, with its sign reversed if the soup as a whole is inside
+  /// out, that is, if its volume is negative about every point of its box. The volume of an open soup depends
+  /// on that point; if even the sign of the volume does, as for a sheet, the winding is taken as it was
+  /// given.
   double operator()(const Eigen::Vector3d& point) const;
   /// Returns true if the winding number is above one half.
   bool inside(const Eigen::Vector3d& point) const { return (*this)(point) > 0.5; }
@@ -50,11 +51,11 @@ class WindingOracle {
   double orientation_ = 1.0;
 };
 
-/// The parts of the triangles that bound the solid. A triangle is one if its middle and three points near its
-/// corners bound it. A triangle of which only some of these points do is split in four, until the pieces'
-/// edges are shorter than `finest` (voxels); so the boundary ends no farther than `finest` from where the
-/// surface dives into the solid. Features that pass between all four points are overlooked, so the triangles
-/// have to be small compared with the features.
+/// Returns the parts of the triangles that bound the solid. A triangle is one if its middle and three points
+/// near its corners bound it. A triangle of which only some of these points do is split in four, until the
+/// pieces' edges are shorter than `finest` (voxels); so the boundary ends no farther than `finest` from where
+/// the surface dives into the solid. Features that pass between all four points are overlooked, so the
+/// triangles have to be small compared with the features.
 /// @throws Cancelled.
 std::vector<Corners> solid_boundary(const DistanceOracle& surface, const WindingOracle& solid, double finest,
                                     const RunContext& context);

@@ -22,7 +22,7 @@ void count_inside_out(const TriangleSoup& soup, const TriangleTree& tree, MeshRe
 /// from outside through the cubes that no triangle intersects (tested by the boxes of the triangle's parts).
 class FreeCells {
  public:
-  /// A grid without cells, for which every point is neither free nor enclosed.
+  /// Creates a grid without cells, for which every point is neither free nor enclosed.
   FreeCells() = default;
   explicit FreeCells(const TriangleTree& tree);
 

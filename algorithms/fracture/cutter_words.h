@@ -33,7 +33,7 @@ struct CutterSpec {
 /// Parses a cutter specification such as `voronoi:50`. @throws Error that states the expected syntax.
 CutterSpec parse_cutters(const std::string& word);
 
-/// The word without the folders of its files, for an output that is the same on every machine.
+/// Returns the word without the directories of its files, for an output that is the same on every machine.
 std::string without_folders(const std::string& word);
 
 /// Parameters of scattered cutters that the specification does not contain.
@@ -55,7 +55,7 @@ struct MadeCutters {
   std::vector<Eigen::Vector3d> seeds = {};  ///< seeds of the cells, world units
 };
 
-/// Box of a solid's samples, world units.
+/// Returns the box of a solid's samples, world units.
 Bounds bounds_of(const FloatHermite& hermite);
 
 /// Makes the cutters of a specification. Scattered cutters are scattered in the object, and random planes

@@ -43,44 +43,45 @@ class Cutters {
   /// sample_index().
   virtual void codes(const At& lower, std::span<CutCode, 512> codes) const = 0;
 
-  /// False if no sample of the block has the code. May also return true for other blocks, if that is cheaper
-  /// to determine.
+  /// Returns false if no sample of the block has the code. May also return true for other blocks, if that is
+  /// cheaper to determine.
   virtual bool may_hold(const At& /*lower*/, CutCode) const { return true; }
 
-  /// The crossing of the edge from sample `at` along `axis` with the surface between two codes, `first` at
-  /// the edge's first sample and `second` at the other. Nothing if that surface does not cross the edge, as
-  /// may be the case once a sample has been given to another piece than its own.
+  /// Returns the crossing of the edge from sample `at` along `axis` with the surface between two codes,
+  /// `first` at the edge's first sample and `second` at the other. Returns nothing if that surface does not
+  /// cross the edge, which is possible if a sample has been assigned to a piece other than its own.
   virtual std::optional<CutCrossing> crossing(const At& at, int axis, CutCode first,
                                               CutCode second) const = 0;
 
-  /// For an edge that the surface between its two codes does not cross: the end of the edge that is nearer to
-  /// the surface (offset 0 or 1), with the surface's normal. Nothing if the cutters cannot determine it.
+  /// Returns, for an edge that the surface between its two codes does not cross, the end of the edge that is
+  /// nearer to the surface (offset 0 or 1), with the surface's normal. Returns nothing if the cutters cannot
+  /// determine it.
   virtual std::optional<CutCrossing> nearest(const At&, int /*axis*/, CutCode, CutCode) const {
     return std::nullopt;
   }
 
-  /// How many cutters there are; their numbers are 0 to count() − 1.
+  /// Returns the number of cutters; they are numbered from 0.
   virtual std::size_t count() const = 0;
-  /// The name of one cutter in an output.
+  /// Returns the name of one cutter in an output.
   virtual std::string name(std::size_t cutter) const = 0;
 
-  /// Unit normal, in world space, of the plane that separates two codes; for a displaced wall, the normal of
-  /// the plane before the displacement. Swapping the codes leaves it unchanged or negates it. Nothing if no
-  /// single plane separates them.
+  /// Returns the unit normal, in world space, of the plane that separates two codes; for a displaced wall,
+  /// the normal of the plane before the displacement. Swapping the codes leaves it unchanged or negates it.
+  /// Returns nothing if no single plane separates them.
   virtual std::optional<Eigen::Vector3d> plane_between(CutCode first, CutCode second) const = 0;
 
-  /// True if a code is a pattern of sides of planes, a bit a plane. Else a code is the number of the cutter
-  /// that holds the sample, or count() where none does.
+  /// Returns true if a code is a pattern of sides of planes, one bit per plane. Otherwise a code is the
+  /// number of the cutter that contains the sample, or count() if none does.
   virtual bool plane_sides() const { return false; }
   /// Returns true if the cutter is a solid of its own that contains no sample.
   virtual bool is_empty(std::size_t) const { return false; }
-  /// For a cutter that is a solid of its own: the samples of the block at `lower` inside it, even those that
-  /// other cutters also contain. Nothing for other cutters.
+  /// Returns, for a cutter that is a solid of its own, the samples of the block at `lower` inside it, even
+  /// those that other cutters also contain. Returns nothing for other cutters.
   virtual std::optional<BlockMask> signs(std::size_t, const At& /*lower*/) const { return std::nullopt; }
-  /// The Hermite data of a cutter that is a solid of its own, owned by this object; null for other and for
-  /// empty cutters.
+  /// Returns the Hermite data of a cutter that is a solid of its own, owned by this object; null for other
+  /// and for empty cutters.
   virtual const FloatHermite* solid(std::size_t) const { return nullptr; }
-  /// The name, in an output, of a piece with this code.
+  /// Returns the name, in an output, of a piece with this code.
   virtual std::string name_of(CutCode code) const = 0;
 };
 
@@ -119,21 +120,21 @@ struct CuttingMesh {
   PolygonMesh mesh;
 };
 
-/// Cutting solids applied one after another (Aldén 2011, §7.1): piece k is the part of the solid inside
-/// cutter k and outside all cutters before it, and the last piece is the part outside all cutters. Each mesh
-/// is voxelized on the object's lattice; its crossings are the exact hits of its polygons. A mesh that is
-/// empty, or so small that it contains no sample, makes no piece.
+/// Returns cutters from solids that are applied one after another (Aldén 2011, §7.1): piece k is the part of
+/// the solid inside cutter k and outside all cutters before it, and the last piece is the part outside all
+/// cutters. Each mesh is voxelized on the object's lattice; its crossings are the exact hits of its polygons.
+/// A mesh that is empty, or so small that it contains no sample, makes no piece.
 /// @throws Error as check_voxelization_fits(); Cancelled.
 std::unique_ptr<Cutters> mesh_cutters(const std::vector<CuttingMesh>& meshes, const IndexToWorld& placement,
                                       RunContext& context);
 
-/// The Hermite data of a mesh on the lattice of `placement`, which may be any regular affine map. Nothing for
-/// a mesh that holds no sample. @throws Error as check_voxelization_fits(); Cancelled.
+/// Returns the Hermite data of a mesh on the lattice of `placement`, which may be any regular affine map;
+/// nothing for a mesh that holds no sample. @throws Error as check_voxelization_fits(); Cancelled.
 std::optional<FloatHermite> hermite_on_lattice(const PolygonMesh& mesh, const IndexToWorld& placement,
                                                RunContext& context);
 
-/// A copy of the mesh, rotated about `centre` by a matrix, scaled, and moved so that `centre` moves to
-/// `place` (world units).
+/// Returns a copy of the mesh, rotated about `centre` by a matrix, scaled, and translated so that `centre`
+/// moves to `place` (world units).
 PolygonMesh placed(const PolygonMesh& mesh, const Eigen::Matrix3d& rotation, double scale,
                    const Eigen::Vector3d& centre, const Eigen::Vector3d& place);
 

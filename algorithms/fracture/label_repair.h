@@ -59,8 +59,8 @@
 
 namespace hermesh {
 
-/// The labels of the corners of a cell whose first corner lies in one of the solid's blocks. Corners that no
-/// block holds have label 0.
+/// Returns the labels of the corners of a cell whose first corner lies in one of the solid's blocks. Corners
+/// that no block holds have label 0.
 CornerLabels corner_labels(const LabelledSolid& solid, const LabelledSolid::Place& cell);
 /// Returns true if a cell, whose first corner lies in one of the solid's blocks, is simple as defined above.
 bool is_simple(const LabelledSolid& solid, const LabelledSolid::Place& cell);

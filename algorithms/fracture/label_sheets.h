@@ -37,7 +37,7 @@ struct JointSheets {
   /// recorded.
   bool is_plain() const { return sheets.sheets <= 1 && sheets.ambiguous_faces == 0; }
 };
-/// The sheets of a cell with these labels at its corners.
+/// Returns the sheets of a cell with these labels at its corners.
 JointSheets joint_sheets(const CornerLabels& labels);
 
 }  // namespace hermesh

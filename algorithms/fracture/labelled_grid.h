@@ -39,7 +39,7 @@ class LabelledGrid : public CellGrid {
   bool is_of_one_piece(std::int32_t block, int cell, int face) const override;
   std::array<std::uint32_t, 2> pieces(std::int32_t block, int sample, int axis) const override;
 
-  /// The two sides of a crossing edge, by its number in the order of blocks, axes and samples.
+  /// Returns the two sides of a crossing edge, by its number in the order of blocks, axes and samples.
   const EdgeSides& sides(std::size_t edge) const { return sides_[edge]; }
   std::size_t edge_count() const { return sides_.size(); }
   std::uint64_t made_up() const { return made_up_; }  ///< how many crossings are made up

@@ -51,9 +51,9 @@ class PieceTriangles {
   /// Sorts the triangles of the mesh, whose sides name no piece above `pieces`.
   PieceTriangles(const JointMesh& mesh, std::uint32_t pieces);
 
-  /// How many pieces there are.
+  /// Returns the number of pieces.
   std::uint32_t count() const { return static_cast<std::uint32_t>(first_.size()) - 2; }
-  /// The triangles that bound a piece from 1 to count(), in the order of the joint mesh.
+  /// Returns the triangles that bound a piece from 1 to count(), in the order of the joint mesh.
   std::span<const Side> of(std::uint32_t piece) const {
     return std::span(sides_).subspan(first_[piece], first_[piece + 1] - first_[piece]);
   }
@@ -63,7 +63,7 @@ class PieceTriangles {
   std::vector<Side> sides_;
 };
 
-/// A piece as a mesh of its own. Vertices have the same order as in the joint mesh; all pieces have the
+/// Returns a piece as a separate mesh. Vertices have the same order as in the joint mesh; all pieces have the
 /// placement's origin, so that files preserve the seams exactly. The polygons have the attributes `surface`
 /// (0 original, 1 cut), `cutter` (−1 for the original surface, and for a cut that belongs to no cutter) and
 /// `neighbour` (the piece on the other side, −1 for the outside).

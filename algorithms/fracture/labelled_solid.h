@@ -76,14 +76,14 @@ struct LabelledSolid {
   };
   std::vector<JoinedFace> joined_faces;  ///< empty until find_joined_faces() of labelled_grid.h fills it
 
-  /// The sample at local coordinates of a block, each from −8 to 15, in the block or one next to it.
+  /// Returns the sample at local coordinates of a block, each from −8 to 15, in the block or one next to it.
   Place locate(std::int32_t block, int x, int y, int z) const {
     return hermesh::locate(blocks[static_cast<std::size_t>(block)].neighbours, x, y, z);
   }
-  /// The label of a sample; 0 where there is no block.
+  /// Returns the label of a sample; 0 if there is no block.
   std::uint32_t label(const Place& at) const { return at.block < 0 ? 0 : labels(at.block, at.sample); }
   std::uint32_t label(std::int32_t block, int x, int y, int z) const { return label(locate(block, x, y, z)); }
-  /// Index coordinates of a block's sample.
+  /// Returns the index coordinates of a block's sample.
   std::array<std::int32_t, 3> index(std::int32_t block, int sample) const {
     const auto& lower = blocks[static_cast<std::size_t>(block)].lower;
     return {lower[0] + (sample >> 6), lower[1] + ((sample >> 3) & 7), lower[2] + (sample & 7)};
@@ -96,11 +96,11 @@ using LabelCube = std::array<std::uint32_t, 729>;
 /// Fills the cube from a field of the solid. Returns false, with the cube not filled, if all its values are
 /// one.
 bool gather_labels(const LabelledSolid& solid, const LabelField& field, std::int32_t block, LabelCube& cube);
-/// The labels of the corners of one of the block's 512 cells.
+/// Returns the labels of the corners of one of the block's 512 cells.
 CornerLabels labels_in(const LabelCube& cube, int cell);
 
-/// The blocks of a solid, with all inside samples of one code and one piece. @throws Error if the solid has
-/// no end; Cancelled.
+/// Returns the blocks of a solid, with all inside samples of one code and one piece. @throws Error if the
+/// solid is infinite; Cancelled.
 LabelledSolid whole_solid(const FloatHermite& hermite, RunContext& context);
 
 /// Asks the cutters for the code of each inside sample, and makes the samples of each code one piece. Fills

@@ -7,8 +7,8 @@
 
 namespace hermesh {
 
-/// One step of splitmix64 (Steele, Lea & Flood 2014): every bit of the result depends on every bit of the
-/// argument.
+/// Returns the result of one step of splitmix64 (Steele, Lea & Flood 2014): every bit of the result depends
+/// on every bit of the argument.
 constexpr std::uint64_t hashed(std::uint64_t x) {
   x += 0x9e3779b97f4a7c15u;
   x = (x ^ (x >> 30)) * 0xbf58476d1ce4e5b9u;
@@ -20,15 +20,15 @@ constexpr std::uint64_t hashed(std::uint64_t x) {
 class Random {
  public:
   explicit Random(std::uint64_t seed) : state_(hashed(seed)) {}
-  /// The next 64 random bits.
+  /// Returns the next 64 random bits.
   std::uint64_t bits() { return hashed(state_++); }
-  /// A random number, uniform in [0, 1).
+  /// Returns a random number, uniform in [0, 1).
   double uniform() { return static_cast<double>(bits() >> 11) * 0x1p-53; }
   /// Returns a random integer, uniform in 0 … n − 1 except for a bias of less than n / 2⁵³.
   std::uint64_t below(std::uint64_t n) {
     return static_cast<std::uint64_t>(uniform() * static_cast<double>(n));
   }
-  /// A random unit vector, uniform on the sphere, by rejection from the cube.
+  /// Returns a random unit vector, uniform on the sphere, by rejection from the cube.
   Eigen::Vector3d direction() {
     for (;;) {
       Eigen::Vector3d v;
@@ -48,7 +48,8 @@ class VectorNoise {
  public:
   explicit VectorNoise(std::uint64_t seed) : octaves_{hashed(seed), hashed(seed + 1)} {}
 
-  /// The sum of two octaves, the finer one half as strong, scaled so that no component leaves [−1, 1].
+  /// Returns the sum of two octaves, the finer one half as strong, scaled so that no component leaves [−1,
+  /// 1].
   Eigen::Vector3d operator()(const Eigen::Vector3d& x) const {
     return (octave(x, octaves_[0]) + 0.5 * octave(2.0 * x + Eigen::Vector3d::Constant(0.5), octaves_[1])) /
            1.5;
@@ -64,7 +65,7 @@ class VectorNoise {
     return {component(0), component(21), component(42)};
   }
 
-  /// One octave at x. The corners of a cell share the hashes of their first coordinates.
+  /// Returns one octave at x. The corners of a cell share the hashes of their first coordinates.
   static Eigen::Vector3d octave(const Eigen::Vector3d& x, std::uint64_t start) {
     std::uint64_t cell[3];
     double t[3];

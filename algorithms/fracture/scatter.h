@@ -29,8 +29,8 @@ struct ScatterOptions {
 std::vector<Eigen::Vector3d> scatter(const LabelledSolid& solid, std::size_t count,
                                      const ScatterOptions& options, RunContext& context);
 
-/// A density about an impact: 1 there, and falling with the distance d as 1 / (1 + (d / radius)³), so that
-/// the number of positions per spherical shell decreases beyond the radius. Both arguments are in world
+/// Returns a density about an impact: 1 there, and falling with the distance d as 1 / (1 + (d / radius)³), so
+/// that the number of positions per spherical shell decreases beyond the radius. Both arguments are in world
 /// units.
 std::function<double(const Eigen::Vector3d&)> density_about(const Eigen::Vector3d& impact, double radius);
 

@@ -51,7 +51,7 @@ class BooleanRule {
         flip_result_(flip_a_) {}
 
   bool unites() const { return unites_; }
-  /// True if the normals of the second operand change sides.
+  /// Returns true if the normals of the second operand are reversed.
   bool turns_b() const { return turns_b_; }
 
   /// Returns the inside bits of the result from those of the operands.

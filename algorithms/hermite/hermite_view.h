@@ -125,8 +125,8 @@ BlockMask cells_with_edges(const HermiteView::Blocks& blocks, std::size_t block,
   return result;
 }
 
-/// Dual contouring's loop over the edges of a block. Calls f(axis, sample, cells) for each crossing edge, in
-/// the order of CrossingEdges::rank(); `cells` are the four around it, in the order of kAroundEdge.
+/// Loops over the edges of a block for dual contouring. Calls f(axis, sample, cells) for each crossing edge,
+/// in the order of CrossingEdges::rank(); `cells` are the four around it, in the order of kAroundEdge.
 template <class F>
 void for_each_edge_with_cells(const HermiteView::Blocks& blocks, std::size_t block, F&& f) {
   if (blocks[block].crossing_count() == 0) return;  // most blocks that exist only for their cells

@@ -59,21 +59,23 @@ struct Projection {
   return {kept(x, 0.0f) * scale, kept(y, 0.0f) * scale, kept(z, 1.0f) * scale, negative & mask};
 }
 
-/// Equation 4.7: a component b of 64 or more does not fit into its six bits, and the complements of both
-/// components are stored instead. The condition is that on b before either is replaced.
+/// Folds components (equation 4.7): a component b of 64 or more does not fit into its six bits, and the
+/// complements of both components are stored instead. The condition is that on b before either is replaced.
 [[gnu::always_inline]] inline std::uint16_t fold(std::uint32_t a, std::uint32_t b) {
   const std::uint32_t complement = (b >> 6) * 127u;  // of seven bits: 127 - a is a ^ 127
   return std::uint16_t((a ^ complement) << 6 | (b ^ complement));
 }
 
-/// Equation 4.8. Complements add up to 254 - a - b, that is to 127 and more, and components to 126 and less.
+/// Undoes fold() (equation 4.8). Complements add up to 254 - a - b, that is to 127 and more, and components
+/// to 126 and less.
 constexpr Components unfold(std::uint16_t code) {
   const std::uint32_t a = (code >> 6) & 127u, b = code & 63u;
   const std::uint32_t complement = ((a + b + 1) >> 7) * 127u;  // the sum is at most 190
   return {a ^ complement, b ^ complement};
 }
 
-/// Newton's iteration from above, which decreases until it has converged; std::sqrt is not constexpr.
+/// Computes a square root by Newton's iteration from above, which decreases until it has converged; std::sqrt
+/// is not constexpr.
 constexpr double square_root(double value) {
   double root = value > 1.0 ? value : 1.0;
   for (double next = 0.5 * (root + value / root); next < root; next = 0.5 * (root + value / root))

@@ -89,8 +89,8 @@ SparseHermite<Crossing> to_sparse(const TestLattice<Crossing>& lattice,
   return result;
 }
 
-/// The lattice of sparse data: signs sample by sample and crossings edge by edge, as returned by the look-up
-/// functions of the sparse data.
+/// Returns the lattice of sparse data: signs sample by sample and crossings edge by edge, as returned by the
+/// look-up functions of the sparse data.
 template <class Crossing>
 TestLattice<Crossing> to_lattice(const SparseHermite<Crossing>& sparse, int lower, int size) {
   TestLattice<Crossing> result{lower, size, sparse.outermost_inside};
@@ -137,7 +137,7 @@ inline EdgeCrossing bisect(const Solid& solid, int axis, std::array<double, 3> a
   return crossing;
 }
 
-/// A lattice of a solid, of which samples less than zero are inside.
+/// Returns a lattice of a solid, of which samples less than zero are inside.
 inline TestLattice<EdgeCrossing> sample_solid(const Solid& solid, int lower = -8, int size = 40) {
   TestLattice<EdgeCrossing> lattice{lower, size};
   lattice.for_each_sample([&](int x, int y, int z) { lattice.sign(x, y, z) = solid(x, y, z) < 0; });
@@ -163,7 +163,7 @@ inline Solid joined(const std::vector<Solid>& solids) {
   };
 }
 
-/// Up to five balls and boxes, some of them with faces on lattice planes, within −4 … 27.
+/// Returns up to five balls and boxes, some of them with faces on lattice planes, within −4 … 27.
 inline Solid random_blobs(std::mt19937& random) {
   std::uniform_real_distribution<double> centre(4, 20), radius(1, 7);
   std::vector<Solid> solids;

@@ -100,7 +100,7 @@ void write_mesh(const std::filesystem::path& path, const PolygonMesh& mesh, RunC
 /// unit.
 void write_mesh_in_metres(const std::filesystem::path& path, const PolygonMesh& mesh, RunContext& context);
 
-/// True if the path ends in one of kMeshEndings, in letters of either case.
+/// Returns true if the path ends in one of kMeshEndings, in letters of either case.
 bool is_mesh_path(const std::filesystem::path& path);
 
 }  // namespace hermesh

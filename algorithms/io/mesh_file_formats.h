@@ -203,10 +203,10 @@ void read_ply(std::string_view bytes, MeshBuilder& builder);
 void read_obj(std::string_view bytes, MeshBuilder& builder);
 void read_off(std::string_view bytes, MeshBuilder& builder);
 void read_stl(std::string_view bytes, MeshBuilder& builder);
-/// True if the bytes have the length of a binary STL file of the declared number of triangles: 84 bytes, then
-/// 50 for each triangle. No other format has exactly that length.
+/// Returns true if the bytes have the length of a binary STL file of the declared number of triangles: 84
+/// bytes, then 50 for each triangle. No other format has exactly that length.
 bool is_binary_stl(std::string_view bytes);
-/// True if the first line is "ply".
+/// Returns true if the first line is "ply".
 bool begins_like_ply(std::string_view bytes);
 /// The first word of an OFF file.
 struct OffKeyword {

@@ -93,7 +93,7 @@ class TextCursor {
 
   bool at_end() const { return at_ == end_; }
   bool at_line_end() const { return at_ == end_ || is_line_end(*at_); }
-  /// True if a number may end here.
+  /// Returns true if a number may end here.
   bool ends_word() const {
     return at_ == end_ || is_space(*at_) || *at_ == comment_ || *at_ == continuation_;
   }
@@ -232,8 +232,8 @@ class TextCursor {
   [[gnu::always_inline]] bool take_word(T& value) {
     return take(value) && (at_ == end_ || is_space(*at_) || take_odd_end(value));
   }
-  /// True if the number ends here although no space follows: at another character that ends a word, or behind
-  /// a name of old C libraries of Windows for a number that is not finite, such as `1.#IND`.
+  /// Returns true if the number ends here although no space follows: at another character that ends a word,
+  /// or behind a name of old C libraries of Windows for a number that is not finite, such as `1.#IND`.
   template <class T>
   [[gnu::noinline]] bool take_odd_end(T& value) {
     if constexpr (std::is_floating_point_v<T>)

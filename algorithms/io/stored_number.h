@@ -49,7 +49,7 @@ inline double largest_of(NumberType type) {
   return with_type(type, [](auto zero) { return double(std::numeric_limits<decltype(zero)>::max()); });
 }
 
-/// True if numbers in this byte order have to be reversed on this machine.
+/// Returns true if numbers in this byte order have to be reversed on this machine.
 constexpr bool is_swapped(bool big_endian) { return big_endian != (std::endian::native == std::endian::big); }
 
 /// Returns the number at any address, its bytes reversed if `swapped`. By default it is little-endian.

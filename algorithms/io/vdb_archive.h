@@ -49,7 +49,7 @@ class VdbReader {
   std::vector<std::string> names() const;
   std::string joined_names() const;  ///< separated by commas, for messages
   bool has(const std::string& name) const { return file_.hasGrid(name); }
-  /// True if the grid is of a type that read() reads.
+  /// Returns true if the grid is of a type that read() reads.
   bool can_read(const std::string& name) const;
   /// Returns the whole grid. @throws Error for an unknown name, for damage, for too little memory, and for a
   /// transform that cannot be inverted.

@@ -75,7 +75,7 @@ class VdbStructure {
   const std::vector<VdbDescriptor>& grids() const { return grids_; }
   /// Returns the grids that OpenVDB may take for the one of that name: one, none, or those that share it.
   std::vector<const VdbDescriptor*> find(const std::string& name) const;
-  /// True if the structure of this type of tree is known here; others must not be read.
+  /// Returns true if the structure of this type of tree is known here; others must not be read.
   static bool is_known(const std::string& type);
 
   /// Checks the metadata and the transform of a grid. @throws Error for damage.

@@ -7,7 +7,7 @@
 
 namespace hermesh {
 
-/// True for the format that stores world coordinates in single precision: STL.
+/// Returns true for the format that stores world coordinates in single precision: STL.
 bool is_written_in_single(const std::filesystem::path& path);
 
 /// Refuses a file in which points of a mesh of this volume would be rounded by more than a hundredth of a

@@ -37,7 +37,7 @@ class LeafPlaces {
 
   std::size_t size() const { return leaves_.size(); }
   const InsideRule& rule() const { return rule_; }
-  /// The volume's tree, or the copy of it that a LeafTable made.
+  /// Returns the volume's tree, or the copy of it that a LeafTable made.
   const openvdb::FloatTree& tree() const { return *tree_; }
   float background() const;
   /// Returns the tree's value, or its state, at coordinates relative to the first sample of `leaf`, in a leaf

@@ -34,7 +34,7 @@ struct ThesisVoxelizerOptions {
 
 /// Options of the variant: those of ThesisVoxelizerOptions.
 std::vector<OptionSpec> thesis_voxelizer_options();
-/// The values of those options.
+/// Returns the values of these options.
 ThesisVoxelizerOptions thesis_voxelizer_options(const Options& options);
 
 /// Makes the level set of any polygon soup, with any winding, as a grid "sdf" of class level set, or without

@@ -21,7 +21,7 @@ inline void add_triangle(PolygonMesh& mesh, const Vector3d& a, const Vector3d& b
   mesh.triangles.push_back({n, n + 1, n + 2});
 }
 
-/// A sphere of latitudes and longitudes, the faces outwards.
+/// Returns a sphere of latitudes and longitudes, the faces outwards.
 inline PolygonMesh sphere(const Vector3d& centre, double radius, int n = 24) {
   PolygonMesh mesh;
   const auto at = [&](int i, int j) {
@@ -105,7 +105,7 @@ inline Errors compare(const PolygonMesh& mesh, const Voxelization& v, double vox
   return errors;
 }
 
-/// A sphere without its cap above z = `cut`.
+/// Returns a sphere without its cap above z = `cut`.
 inline PolygonMesh opened(double radius, double cut) {
   PolygonMesh mesh = sphere({0, 0, 0}, radius, 48);
   std::erase_if(mesh.triangles, [&](const Triangle& t) {

@@ -9,12 +9,12 @@
 
 namespace hermesh {
 
-/// The level set with the exact distance at every sample within `half_width` voxels, rounded to single
-/// precision; sample (0, 0, 0) is the world's origin. @throws Error where the shape does not know distances
-/// that large; Cancelled.
+/// Returns the level set with the exact distance at every sample within `half_width` voxels, rounded to
+/// single precision; sample (0, 0, 0) is the world's origin. @throws Error where the shape does not know
+/// distances that large; Cancelled.
 LevelSet exact_level_set(const PlacedShape& shape, double voxel_size, double half_width, RunContext& context);
 
-/// Exact crossings and normals on that level set's lattice and with its signs. @throws Cancelled.
+/// Returns exact crossings and normals on that level set's lattice and with its signs. @throws Cancelled.
 FloatHermite exact_hermite(const PlacedShape& shape, const LevelSet& level_set, RunContext& context);
 
 /// How far a level set is from the truth, over its active voxels.

@@ -33,27 +33,28 @@ class ExactShape {
   /// Returns the nearest point of the surface, or one of them if there are several. On a crease, the normal
   /// is that of the adjacent face that `p` is farther above.
   virtual SurfacePlace nearest(const Eigen::Vector3d& p) const = 0;
-  /// Signed distance to the surface, negative inside; exact where |distance| is below exact_within().
+  /// Returns the signed distance to the surface, negative inside; exact where |distance| is below
+  /// exact_within().
   virtual double distance(const Eigen::Vector3d& p) const = 0;
   virtual double exact_within() const { return 1e300; }
-  /// A function with the sign of distance() that is never larger in size than the distance, and whose slope
-  /// is at most 1: the distance itself where that is one everywhere.
+  /// Returns the value at p of a function with the sign of distance() that never exceeds the distance in
+  /// magnitude, and whose slope is at most 1: the distance itself if that is exact everywhere.
   virtual double bounded_distance(const Eigen::Vector3d& p) const { return distance(p); }
 
   virtual std::optional<double> area() const = 0;    ///< none: it has no closed form
   virtual std::optional<double> volume() const = 0;  ///< none: it has no closed form
   virtual Eigen::Vector3d half_size() const = 0;     ///< the solid lies within these, along the axes
 
-  /// True where normals jump along creases.
+  /// Returns true if normals are discontinuous along creases.
   virtual bool is_sharp() const { return false; }
-  /// True where all of the surface is flat, so that polygons and Hermite data represent it exactly.
+  /// Returns true if all of the surface is flat, so that polygons and Hermite data represent it exactly.
   virtual bool is_flat() const { return false; }
   /// Points of all creases, `spacing` apart or less.
   virtual std::vector<Eigen::Vector3d> crease_points(double /*spacing*/) const { return {}; }
   virtual std::vector<Eigen::Vector3d> corners() const { return {}; }
 
-  /// Part of space in which the surface is the one that is described; all of it except for shapes that had to
-  /// be cut off.
+  /// Returns true if p is in the part of space in which the surface is the described one, which is all of
+  /// space except for shapes that had to be cut off.
   virtual bool describes(const Eigen::Vector3d& /*p*/) const { return true; }
 
   /// Triangles with all corners on the surface and sides of about `length`, closed and oriented outwards,
@@ -91,7 +92,8 @@ class PlacedShape {
   Eigen::Isometry3d to_world_, to_shape_;
 };
 
-/// The shape rotated by 20°, 30° and 40° about x, y and z, so that nothing is axis-aligned, and translated.
+/// Returns the shape rotated by 20°, 30° and 40° about x, y and z, so that nothing is axis-aligned, and
+/// translated.
 PlacedShape turned(std::shared_ptr<const ExactShape> shape, const Eigen::Vector3d& move);
 
 }  // namespace hermesh

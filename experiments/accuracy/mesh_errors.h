@@ -27,7 +27,7 @@ enum class Quantity {
 inline constexpr std::array kQuantities = {Quantity::kRms,       Quantity::kMax,    Quantity::kNormals,
                                            Quantity::kArea,      Quantity::kVolume, Quantity::kCurvature,
                                            Quantity::kHausdorff, Quantity::kEdges,  Quantity::kCorners};
-/// "rms", "max", "normals", "area", "volume", "curvature", "hausdorff", "edges", "corners".
+/// Returns "rms", "max", "normals", "area", "volume", "curvature", "hausdorff", "edges", "corners".
 const char* name(Quantity quantity);
 
 /// Errors by quantity, those of area and volume signed (negative: too small); none where the shape has no

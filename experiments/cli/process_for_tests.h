@@ -90,11 +90,11 @@ class ProgramTest : public testing::Test {
   /// Names of all files in the directory.
   std::set<std::string> files() const;
 
-  /// A cube with a side of 2 about the origin, 8 points and 12 triangles, as cube.off.
+  /// Writes a cube with a side of 2 about the origin, 8 points and 12 triangles, as cube.off.
   void write_cube();
-  /// The cube without one of its faces, so that the program notes a hole, as open.off.
+  /// Writes the cube without one of its faces, so that the program notes a hole, as open.off.
   void write_open_cube();
-  /// A unit sphere of latitudes and longitudes, as sphere.off.
+  /// Writes a unit sphere of latitudes and longitudes, as sphere.off.
   void write_sphere();
 
  private:

@@ -40,7 +40,7 @@ class FractureFolder {
   validation::FractureReport judge(RunContext& context, const PolygonMesh& uncut = {},
                                    double reach = 0.0) const;
 
-  /// Name of the file of piece number `piece`, which counts from 1 on.
+  /// Returns the file name of piece number `piece`, counted from 1.
   static std::string file_name(std::uint32_t piece);
 
  private:

@@ -50,7 +50,7 @@ inline FloatHermite turned_box() {
       {24, 24, 24});
 }
 
-/// A ball with a rough surface: overhangs, thin ridges, cells of several sheets.
+/// Returns a ball with a rough surface: overhangs, thin ridges, cells of several sheets.
 inline FloatHermite rock() {
   const VectorNoise noise(7);
   const auto value = [=](const Eigen::Vector3d& p) { return p.norm() - kHalf - 4.0 * noise(p / 4.0)[0]; };

@@ -18,9 +18,10 @@ struct FractureObject {
   const PolygonMesh* source = nullptr;  ///< whose attributes the pieces take over; null: none
 };
 
-/// The object's mesh before it is broken, at tolerance 0; empty if no sample is inside. @throws Cancelled.
+/// Returns the object's mesh before it is broken, at tolerance 0; empty if no sample is inside. @throws
+/// Cancelled.
 PolygonMesh uncut_mesh(const FractureObject& object, RunContext& context);
-/// Volume of uncut_mesh() (cubic world units); 0 if no sample is inside. @throws Cancelled.
+/// Returns the volume of uncut_mesh() (cubic world units); 0 if no sample is inside. @throws Cancelled.
 double uncut_volume(const FractureObject& object, RunContext& context);
 
 struct FractureMethod {

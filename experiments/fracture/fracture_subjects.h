@@ -22,14 +22,14 @@ struct FractureSubject {
 /// stretched to their boxes, are used as substitutes.
 const std::vector<FractureSubject>& fracture_subjects();
 
-/// The mesh of a subject's case, stretched to its proportions. @throws Error as load_case() does.
+/// Returns the mesh of a subject's case, stretched to its proportions. @throws Error as load_case() does.
 PolygonMesh load_subject(const FractureSubject& subject, const MeasurementInput& input);
 
 struct SampledSubject {
   FractureObject object;
   double hermite_seconds = 0.0;  ///< time that the Hermite data took
 };
-/// The mesh as an object to break, sampled with `longest` voxels along its longest side, its signs from a
+/// Samples the mesh as an object to break, with `longest` voxels along its longest side, its signs from a
 /// voxelizer of `hermesh list`.
 SampledSubject sample_subject(const PolygonMesh& mesh, double longest, const MeasurementInput& input,
                               const std::string& voxelizer = "hermesh");

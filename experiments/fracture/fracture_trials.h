@@ -17,7 +17,7 @@ struct FractureTrial {
   std::string cutters;   ///< as parse_cutters() takes it: one to three planes, or two to twenty cells
 };
 
-/// Trial number `number`, the same on every machine. The kinds take turns.
+/// Returns trial number `number`, the same on every machine. The kinds alternate.
 FractureTrial fracture_trial(std::uint64_t number);
 
 }  // namespace hermesh

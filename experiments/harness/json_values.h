@@ -17,7 +17,7 @@ double number_at(const Json& row, const std::string& pointer);
 /// Returns a text unchanged, any other value as JSON, and "" if there is none.
 std::string text_at(const Json& row, const std::string& pointer);
 
-/// 1234567 → "1,234,567"; numbers that are not whole get three significant digits.
+/// Formats a number: 1234567 → "1,234,567"; numbers that are not whole get three significant digits.
 std::string readable(double value);
 
 }  // namespace hermesh

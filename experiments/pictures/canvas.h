@@ -28,7 +28,7 @@ inline constexpr double kMargin = 24, kGap = 14, kTitleSize = 22, kSubtitleSize 
 /// down.
 class Canvas {
  public:
-  /// White paper. @throws Error for a size that Cairo does not support.
+  /// Creates a white canvas. @throws Error for a size that Cairo does not support.
   Canvas(int width, int height);
 
   /// Shortens the text with an ellipsis if it is wider than `room` pixels.
@@ -39,7 +39,7 @@ class Canvas {
   void captions(double x, double y, const std::string& label, const std::vector<std::string>& lines,
                 double room);
   void image(double x, double y, const Image& picture);
-  /// The outline of a rectangle, its line centred on it.
+  /// Draws the outline of a rectangle, with the line centred on it.
   void frame(double x, double y, double width, double height, Tone colour, double line);
   void box(double x, double y, double width, double height, Tone colour);
   /// Writes the file atomically. @throws Error if the path cannot be written.

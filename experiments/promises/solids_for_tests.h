@@ -11,8 +11,8 @@
 
 namespace hermesh::test_solids {
 
-/// The mesh turned, scaled and moved in double precision, and then read as a file would be: in single
-/// precision about an origin of its own.
+/// Returns the mesh rotated, scaled and translated in double precision, and then read as from a file: in
+/// single precision about an origin of its own.
 inline PolygonMesh placed(const PolygonMesh& mesh, const Eigen::Matrix3d& linear, const Eigen::Vector3d& at) {
   MeshFile file = to_mesh_file(mesh);
   for (Eigen::Vector3d& point : file.points) point = linear * point + at;
@@ -20,13 +20,13 @@ inline PolygonMesh placed(const PolygonMesh& mesh, const Eigen::Matrix3d& linear
   return to_polygon_mesh(file);
 }
 
-/// Cuboid with its lower corner and sizes in world units, twelve triangles.
+/// Returns a cuboid with its lower corner and sizes in world units, twelve triangles.
 inline PolygonMesh cuboid(const Eigen::Vector3d& lower, const Eigen::Vector3d& size) {
   RunContext context;
   return placed(make_recipe("turned-cube", {}, context), size.asDiagonal(), lower + 0.5 * size);
 }
 
-/// Prism over a star of `teeth` points, from z = −0.4 to 0.4, radius 1.
+/// Returns a prism over a star of `teeth` points, from z = −0.4 to 0.4, radius 1.
 inline PolygonMesh gear(int teeth) {
   MeshFile file;
   const int n = 2 * teeth;
@@ -57,7 +57,7 @@ inline Eigen::Vector3d random_vector(recipes::Random& random, double most) {
   return {x, y, random.uniform(-most, most)};
 }
 
-/// Ball, box, gear, torus, cylinder or part, by number; sizes of about 2, about the origin.
+/// Returns a ball, box, gear, torus, cylinder or part, by number; sizes of about 2, about the origin.
 inline PolygonMesh solid(std::uint64_t number) {
   RunContext context;
   switch (number % 6) {

@@ -13,7 +13,7 @@
 
 namespace hermesh_tests {
 
-/// The six faces of an axis-aligned cube of that side with its lowest corner there, as quads.
+/// Returns the six faces of an axis-aligned cube of that side with its lowest corner there, as quads.
 inline hermesh::Mesh cube(double side, std::array<double, 3> lower = {0, 0, 0}) {
   std::vector<double> points;
   for (int i = 0; i < 8; ++i)
@@ -23,7 +23,7 @@ inline hermesh::Mesh cube(double side, std::array<double, 3> lower = {0, 0, 0}) 
   return hermesh::Mesh(std::span<const double>(points), {}, quads);
 }
 
-/// A torus about the z axis, of triangles.
+/// Returns a torus about the z axis, of triangles.
 inline hermesh::Mesh torus(double large = 1.0, double small = 0.4, int around = 48, int across = 24) {
   std::vector<float> points;
   std::vector<std::uint32_t> triangles;

@@ -27,7 +27,7 @@ struct ManifoldDualContouringOptions {
 PolygonMesh manifold_dual_contouring(const HermiteView& grid, const ManifoldDualContouringOptions& options,
                                      const AdaptivityField* field, RunContext& context);
 
-/// The table's entry.
+/// Implements the table's entry.
 PolygonMesh manifold_dual_contouring(const ExtractionInput& input);
 std::vector<OptionSpec> manifold_dual_contouring_options();
 

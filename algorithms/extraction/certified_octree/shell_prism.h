@@ -30,14 +30,14 @@ class ShellPrism {
   const OverTriangle& over() const { return over_; }
   const std::array<Eigen::Vector3d, 3>& pillars() const { return pillars_; }
   double height() const { return height_; }
-  /// Outward lean of a pillar per voxel of height, by side and end of the side.
+  /// Returns the outward lean of a pillar per voxel of height, by side and end of the side.
   const std::array<std::array<double, 2>, 3>& leans() const { return leans_; }
-  /// The planes of lid and bottom, positive outside.
+  /// Returns the planes of lid and bottom, positive outside.
   const Plane& lid() const { return lid_; }
   const Plane& bottom() const { return bottom_; }
-  /// A box about all of the prism.
+  /// Returns a box about all of the prism.
   const Eigen::AlignedBox3d& box() const { return box_; }
-  /// Least distance of lid and bottom from the triangle's plane, as a fraction of the height.
+  /// Returns the least distance of lid and bottom from the triangle's plane, as a fraction of the height.
   double least_lid() const { return least_lid_; }
   /// Returns the distance of a position beyond a side's wall, or a lower bound: negative if it may be inside.
   double beyond_wall(const OverTriangle::Place& place, std::size_t side) const;

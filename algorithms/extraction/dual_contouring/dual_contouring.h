@@ -59,7 +59,8 @@ DualContouringOptions read_dual_contouring_options(const ExtractionInput& input)
 /// Reads the same without `reach`, for an extractor whose table has none.
 DualContouringOptions read_placement_options(const ExtractionInput& input);
 
-/// The table's entry: samples the Hermite data first. @throws Error as hermite_input() does; Cancelled.
+/// Implements the table's entry: samples the Hermite data first. @throws Error as hermite_input() does;
+/// Cancelled.
 PolygonMesh dual_contouring(const ExtractionInput& input);
 std::vector<OptionSpec> dual_contouring_options();
 

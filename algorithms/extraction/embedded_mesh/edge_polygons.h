@@ -86,7 +86,7 @@ class EdgePolygons {
   std::uint64_t fanned_edges() const { return fanned_edges_; }
   std::uint64_t quad_count() const { return quads_; }
   std::uint64_t triangle_count() const { return triangles_; }
-  /// The number of quads, and of triangles, of the blocks before this one.
+  /// Returns the number of quads, and of triangles, of the blocks before this one.
   std::uint32_t first_quad(std::int32_t block) const { return edges_[block].first_quad; }
   std::uint32_t first_triangle(std::int32_t block) const { return edges_[block].first_triangle; }
 

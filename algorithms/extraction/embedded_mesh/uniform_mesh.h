@@ -118,7 +118,7 @@ class UniformCells {
   ~UniformCells();
 
   const CellBlocks& cells() const;
-  /// The vertices placed so far. References to single ones are invalidated by the next request.
+  /// Returns the vertices placed so far. References to single ones are invalidated by the next request.
   const UniformPoints& points() const;
   const UniformCounts& counts() const;  ///< of the parts made so far
   /// Computes the vertices of the active cells in `wanted`, a mask per block, unless done before. @throws

@@ -32,7 +32,7 @@ class UniformPoints {
     return result;
   }
 
-  /// The position of a vertex that there is room for. Not safe to call during make_room().
+  /// Returns the position of a vertex that there is room for. Not safe to call during make_room().
   Eigen::Vector3d& operator[](std::uint32_t point) { return places_[slot(point)]; }
   const Eigen::Vector3d& operator[](std::uint32_t point) const { return places_[slot(point)]; }
 

@@ -44,7 +44,7 @@ struct ImportOptions {
   std::optional<std::int64_t> frame;
 };
 
-/// True if the path ends in .nii, .hdr or .img, possibly followed by .gz.
+/// Returns true if the path ends in .nii, .hdr or .img, possibly followed by .gz.
 bool is_nifti_path(const std::filesystem::path& path);
 
 /// Imports NIfTI-1 in one file (.nii) or two (.hdr and .img, either of which may be named), in either byte

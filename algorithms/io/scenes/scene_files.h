@@ -21,7 +21,7 @@ void read_glb(std::string_view bytes, MeshBuilder& builder);
 /// Reads a glTF 2.0 file in text (.gltf) as above. Its buffers are in the file itself, or files in its
 /// directory or below. @throws Error as above, and for a buffer that is elsewhere or cannot be read.
 void read_gltf(std::string_view bytes, MeshBuilder& builder);
-/// True if the bytes begin like a .glb file.
+/// Returns true if the bytes begin like a .glb file.
 bool begins_like_glb(std::string_view bytes);
 
 /// Reads the objects that the build of a 3MF file lists, with components, including those that the production

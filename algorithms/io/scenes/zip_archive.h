@@ -29,7 +29,8 @@ class ZipArchive {
   /// damaged.
   ZipArchive(std::string_view bytes, const MeshBuilder& builder);
 
-  /// True if there is a member of this name, in letters of either case, with or without a leading slash.
+  /// Returns true if there is a member of this name, in letters of either case, with or without a leading
+  /// slash.
   bool has(const std::string& name) const { return find(name) != nullptr; }
   /// Begins to unpack a member; it replaces the one before. @throws Error if it does not exist, is encrypted
   /// or packed by another method than deflate, if its length is impossible, or if check_unpacked() refuses
@@ -38,7 +39,7 @@ class ZipArchive {
   /// Unpacks the next bytes and returns their number: 0 at the end, where length and checksum have been
   /// compared with the directory. @throws Error if they differ, or if the data do not unpack.
   std::size_t read(std::span<char> room);
-  /// Length of the member as the directory declares it, and number of bytes read so far.
+  /// Returns the length of the member as the directory declares it, and the number of bytes read so far.
   std::uint64_t size() const { return size_; }
   std::uint64_t done() const { return done_; }
 
@@ -61,7 +62,7 @@ class ZipArchive {
   std::uint64_t opened_ = 0, size_ = 0, done_ = 0;  ///< opened_: unpacked bytes of all members opened
 };
 
-/// True if the bytes begin with the header of a member, or with the end of an empty archive.
+/// Returns true if the bytes begin with the header of a member, or with the end of an empty archive.
 bool begins_like_zip(std::string_view bytes);
 
 /// Packs members into an archive whose times are all 1 January 1980, the earliest that ZIP has, so that the

@@ -79,7 +79,7 @@ inline Ints widened(const std::uint16_t* at) {
 }
 inline Floats to_floats(Ints x) { return __builtin_convertvector(x, Floats); }
 inline Floats magnitude(Floats x) { return (Floats)((Ints)x & 0x7fffffff); }
-/// x where the mask is −1, else 0.
+/// Returns x where the mask is −1, else 0.
 inline Floats kept(Ints mask, Floats x) { return (Floats)((Ints)x & mask); }
 
 /// Loads two numbers from each address.
@@ -217,7 +217,7 @@ inline Floats load_rows(const float* first, std::size_t stride) {
 struct Rows4 {
   Floats column[4];
 
-  /// Row i of kLanes from `row(i)`, four numbers in a register.
+  /// Builds row i of kLanes from `row(i)`, four numbers in a register.
   template <class Row>
   static Rows4 of(Row&& row) {
     Rows4 result;
@@ -225,7 +225,7 @@ struct Rows4 {
     result.transpose();
     return result;
   }
-  /// Row i from `row(i)`, a pointer to four numbers.
+  /// Loads row i from `row(i)`, a pointer to four numbers.
   template <class Row>
   static Rows4 gathered(Row&& row) {
     return of([&](int i) { return _mm_loadu_ps(reinterpret_cast<const float*>(row(i))); });
@@ -248,7 +248,7 @@ struct Rows4 {
     rows.transpose();
     for (int k = 0; k < 4; ++k) store(out + kLanes * k, rows.column[k]);
   }
-  /// Row i to `where(i)`.
+  /// Stores row i at `where(i)`.
   template <class Where>
   void scatter_rows(Where&& where) const {
     Rows4 rows = *this;

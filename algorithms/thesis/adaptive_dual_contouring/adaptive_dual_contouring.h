@@ -116,7 +116,7 @@ PolygonMesh adaptive_dual_contouring(const FloatHermite& hermite, const Adaptive
 PolygonMesh adaptive_dual_contouring(const ThesisDense& hermite, const AdaptiveOptions& options,
                                      const AdaptivityField* field, RunContext& context);
 
-/// The variant: meshes a level set via Hermite data, with the input's options.
+/// Implements the variant: meshes a level set via Hermite data, with the input's options.
 PolygonMesh adaptive_dual_contouring(const ExtractionInput& input);
 /// Options of the variant: those of AdaptiveOptions, and those of the Hermite data.
 std::vector<OptionSpec> adaptive_dual_contouring_options();

@@ -62,9 +62,9 @@ class PackedEdges : public EdgeSource {
   void read(std::int32_t block, int axis, const BlockMask& wanted, EdgeCrossing* out) const override;
 
   std::size_t tagged() const { return tagged_; }  ///< number of edges tagged with data
-  /// Number of edges whose ends differ in sign and that are not tagged: they get no polygon.
+  /// Returns the number of edges whose ends differ in sign and that are not tagged: they get no polygon.
   std::size_t lost() const { return lost_; }
-  /// Number of edges that are tagged although their ends have one sign.
+  /// Returns the number of edges that are tagged although their ends have one sign.
   std::size_t needless() const { return needless_; }
 
  private:

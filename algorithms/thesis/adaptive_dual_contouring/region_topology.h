@@ -24,9 +24,9 @@ constexpr unsigned reached(unsigned set, unsigned from) {
   }
 }
 
-/// The first test for all 256 patterns of corners inside (Gerstner & Pajarola 2000): edges whose ends have
-/// one sign are collapsed; the contour is one disc if a single edge is left, that is, if the corners inside
-/// are connected, those outside are, and there are some of both.
+/// Computes the first test for all 256 patterns of corners inside (Gerstner & Pajarola 2000): edges whose
+/// ends have one sign are collapsed; the contour is one disc if a single edge is left, that is, if the
+/// corners inside are connected, those outside are, and there are some of both.
 constexpr std::array<bool, 256> collapse_table() {
   std::array<bool, 256> table{};
   for (unsigned inside = 1; inside < 255; ++inside) {

@@ -53,10 +53,11 @@ struct Facet {
   explicit Facet(const TriangleCorners& c)
       : corner{{c[0], c[1], c[2]}, {c[3], c[4], c[5]}, {c[6], c[7], c[8]}} {}
 
-  /// Lower and upper corner of the bounding box.
+  /// Returns the lower and upper corner of the bounding box.
   Eigen::Vector3d low() const { return corner[0].cwiseMin(corner[1]).cwiseMin(corner[2]); }
   Eigen::Vector3d high() const { return corner[0].cwiseMax(corner[1]).cwiseMax(corner[2]); }
-  /// Normal on the side from which the corners run counter-clockwise; its length is twice the area.
+  /// Returns the normal on the side from which the corners run counter-clockwise; its length is twice the
+  /// area.
   Eigen::Vector3d normal() const { return (corner[1] - corner[0]).cross(corner[2] - corner[0]); }
 };
 

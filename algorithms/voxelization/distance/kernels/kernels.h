@@ -58,7 +58,7 @@ struct Distances {
   alignas(64) std::int32_t id[512];  ///< of the nearest triangle; only on request
 };
 
-/// Index in Distances of voxel (x, y, z) of the leaf, each 0 … 7.
+/// Returns the index in Distances of voxel (x, y, z) of the leaf, each 0 … 7.
 constexpr int position(int x, int y, int z) {
   return ((x >> 1) << 7 | (y >> 1) << 5 | (z >> 2) << 4) | ((x & 1) << 3 | (y & 1) << 2 | (z & 3));
 }

@@ -21,7 +21,7 @@ enum class Boolean {
 /// A solid on a lattice: a level set for the signs of its samples, and its crossings. Copies share the data.
 class HERMESH_API Solid {
  public:
-  /// An empty object, whose members must not be called.
+  /// Creates an empty object, whose members must not be called.
   Solid();
   explicit operator bool() const noexcept { return data_ != nullptr; }
 
@@ -36,7 +36,7 @@ class HERMESH_API Solid {
   std::size_t crossings() const noexcept;     ///< lattice edges with data
   std::size_t memory_bytes() const noexcept;  ///< of the crossings and their masks
 
-  /// x, y, z of each crossing, world units, and its unit normal.
+  /// Returns x, y, z of each crossing, world units, and its unit normal.
   std::vector<float> crossing_points() const;
   std::vector<float> crossing_normals() const;
 

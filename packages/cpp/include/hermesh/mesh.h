@@ -41,7 +41,7 @@ struct Attribute {
 /// split each along its better diagonal, as the program does; give triangles to prescribe a split.
 class HERMESH_API Mesh {
  public:
-  /// No points, no polygons.
+  /// Creates a mesh without points and polygons.
   Mesh();
 
   /// Makes a mesh of arrays, which are copied once.
@@ -60,10 +60,11 @@ class HERMESH_API Mesh {
   explicit Mesh(std::span<const double> points, std::span<const std::uint32_t> triangles,
                 std::span<const std::uint32_t> quads = {}, std::span<const Attribute> attributes = {});
 
-  /// x, y, z of each point, world units, relative to origin(). The arrays of a mesh live as long as it or a
-  /// copy of it.
+  /// Returns x, y, z of each point, world units, relative to origin(). The arrays of a mesh live as long as
+  /// it or a copy of it.
   std::span<const float> points() const noexcept;
-  /// The zero of points(), world units; (0, 0, 0) unless the mesh lies far from it, compared with its size.
+  /// Returns the origin of points(), world units; (0, 0, 0) unless the mesh lies far from it, compared with
+  /// its size.
   std::array<double, 3> origin() const noexcept;
   /// Returns x, y, z of each point in world units.
   std::vector<double> world_points() const;

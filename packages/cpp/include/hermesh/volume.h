@@ -22,7 +22,8 @@ namespace hermesh::HERMESH_V1 {
 struct Placement {
   std::array<std::array<double, 4>, 3> rows = {{{1, 0, 0, 0}, {0, 1, 0, 0}, {0, 0, 1, 0}}};
 
-  /// Cubic voxels along the axes: sample (i, j, k) at origin + voxel_size · (i, j, k), world units.
+  /// Returns a placement with cubic voxels along the axes: sample (i, j, k) at origin + voxel_size · (i, j,
+  /// k), world units.
   static Placement uniform(double voxel_size, std::array<double, 3> origin = {0, 0, 0}) {
     return {{{{voxel_size, 0, 0, origin[0]}, {0, voxel_size, 0, origin[1]}, {0, 0, voxel_size, origin[2]}}}};
   }
@@ -58,7 +59,7 @@ struct DenseOptions {
 /// except `bool` throw Error for an empty volume.
 class HERMESH_API Volume {
  public:
-  /// An empty volume.
+  /// Creates an empty volume.
   Volume();
   explicit operator bool() const noexcept { return grid_ != nullptr; }
 
