@@ -28,7 +28,8 @@ def print_options(commands):
     """Prints the options of all commands as JSON, for the manual and the completion of shells."""
     listed = {}
     for name, parser in commands.choices.items():
-        listed[name] = [{"names": action.option_strings, "place": "" if action.option_strings else action.metavar or action.dest,
+        listed[name] = [{"names": action.option_strings,
+                         "place": "" if action.option_strings else action.metavar or action.dest,
                          "help": (action.help or "").replace("%%", "%"), "takes_value": action.nargs != 0,
                          "required": action.required, "choices": list(map(str, action.choices or []))}
                         for action in parser._actions if action.help != argparse.SUPPRESS]
@@ -39,8 +40,10 @@ def print_options(commands):
 def check_log(parser, arguments):
     """Exits if the log would be appended to a file that the command reads."""
     log = getattr(arguments, "log", None)
-    others = [str(value) for name, value in vars(arguments).items() if name != "log" and isinstance(value, (str, pathlib.Path))]
-    if log and os.path.exists(log) and any(os.path.exists(each) and os.path.samefile(log, each) for each in others):
+    others = [str(value) for name, value in vars(arguments).items() if name != "log"
+              and isinstance(value, (str, pathlib.Path))]
+    if log and os.path.exists(log) and any(os.path.exists(each) and os.path.samefile(log, each)
+                                           for each in others):
         parser.error(f"--log '{log}' is a file that the command reads; choose another name")
 
 

@@ -123,7 +123,8 @@ def judge(claim, rows):
             raise LabError(f"claim {claim.id}: {error}") from None
         judged.reason = f"there are no rows of {absent[1]}"
     if judged.verdict == "contradicted" and len(claim.why) < 2:
-        judged.verdict, judged.reason = "missing", 'contradicted, but "why" does not explain it in two sentences'
+        judged.verdict, judged.reason = (
+            "missing", 'contradicted, but "why" does not explain it in two sentences')
     return judged
 
 
@@ -252,7 +253,8 @@ def _value_text(value):
 def as_json(verdicts):
     """Returns [(claim, judged)] as JSON."""
     entries = [{"id": claim.id, "place": claim.place, "says": claim.says, "kind": claim.kind,
-                "printed": claim.printed, "ours": judged.values, "tests": claim.tests, "verdict": judged.verdict,
+                "printed": claim.printed, "ours": judged.values, "tests": claim.tests,
+                "verdict": judged.verdict,
                 "reason": judged.reason, "why": claim.why, "warnings": judged.warnings}
                for claim, judged in verdicts]
     return json.dumps(entries, indent=1, ensure_ascii=False) + "\n"
@@ -269,7 +271,8 @@ def add_command(subparsers):
     parser.add_argument("--of", help="only claims on this table or figure of the thesis, e.g. table_9_2")
     parser.add_argument("--format", choices=["md", "json"], default="md", help="default: md")
     parser.add_argument("--doctor", action="store_true",
-                        help="try each rule on modified rows and list those that cannot fail; if any, exit code 3")
+                        help="try each rule on modified rows and list those that cannot fail; if any, exit "
+                             "code 3")
     parser.set_defaults(function=run)
 
 
@@ -282,7 +285,8 @@ def run(arguments):
     rows = RowDatabase()
     rows.add_directories(arguments.results)
     if arguments.doctor:
-        wrong = [f"{claim.id}: {problem}" for claim in claims for problem in rules_that_cannot_fail(claim, rows)]
+        wrong = [f"{claim.id}: {problem}" for claim in claims
+                 for problem in rules_that_cannot_fail(claim, rows)]
         print("".join(problem + "\n" for problem in wrong), end="")
         return 3 if wrong else 0
     verdicts = [(claim, judge(claim, rows)) for claim in claims]

@@ -6,8 +6,8 @@ import re
 import sqlite3
 import statistics
 
-from .rows import (LabError, all_columns, common_columns, find, is_stand_in, latest_groups, own_columns, read_rows, to_json,
-                   value_of)
+from .rows import (LabError, all_columns, common_columns, find, is_stand_in, latest_groups, own_columns,
+                   read_rows, to_json, value_of)
 
 
 class _Median:
@@ -58,7 +58,8 @@ class RowDatabase:
         self.connection.execute(f'CREATE TABLE "{name}" ({columns})')
         marks = ", ".join("?" * len(names))
         self.connection.executemany(f'INSERT INTO "{name}" VALUES ({marks})',
-                                    ([_bound(found.get(name)) for name in names] for found in map(values, shown)))
+                                    ([_bound(found.get(name)) for name in names]
+                                     for found in map(values, shown)))
         self.tables.append(name)
         self.rows_of[name] = rows
 
@@ -114,4 +115,5 @@ def values(row):
 
 
 def _bound(value):
-    return int(value) if isinstance(value, bool) else to_json(value) if isinstance(value, (dict, list)) else value
+    return (int(value) if isinstance(value, bool) else to_json(value) if isinstance(value, (dict, list))
+            else value)

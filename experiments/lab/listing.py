@@ -10,7 +10,8 @@ from .rows import ROOT
 def cases():
     """Returns (name, summary, kind) of each case; its kind is file, generated or volume."""
     document = tomllib.loads((ROOT / "experiments/cases.toml").read_text())
-    return [(case["name"], case["summary"], "volume" if "volume" in case else "file" if "files" in case else "generated")
+    return [(case["name"], case["summary"],
+             "volume" if "volume" in case else "file" if "files" in case else "generated")
             for case in document["case"]]
 
 

@@ -6,7 +6,8 @@ them.
   <!--=legend DIR-->…<!--/-->                       the meanings of their headers
   <!--=claims-->…<!--/-->                           the claims of paper/claims.toml with their verdicts
   <!--=ablations-->…<!--/-->                        the effects of the full tiers of all ablations
-  <!--=count VERDICT-->…<!--/-->                    the number of claims with that verdict; without one, of all
+  <!--=count VERDICT-->…<!--/-->                    the number of claims with that verdict; without one, of
+                                                    all
 """
 
 import functools
@@ -39,7 +40,8 @@ def check(root):
     found += [f"{file} is not what `hermesh report` makes of its rows; run `hermesh report --fill`"
               for file, text in pages.tables().items() if pages.read(file) != text]
     if pages.read("results/SHA256SUMS") != pages.sums():
-        found.append("results/SHA256SUMS: rows differ from the hashes that were written when they were accepted")
+        found.append("results/SHA256SUMS: rows differ from the hashes that were written when they were "
+                     "accepted")
     return found + sorted(pages.problems_of_rows())
 
 
@@ -147,8 +149,8 @@ def orphans(text, plain):
     """Returns [(line, number)] for each number of a page that is in no marker, code, link, or phrase of
     `plain`.
 
-    Years, and numbers of chapters, sections, tables, figures, equations and algorithms, do not count. A phrase may
-    be broken between lines.
+    Years, and numbers of chapters, sections, tables, figures, equations and algorithms, do not count. A
+    phrase may be broken between lines.
     """
     phrases = [re.escape(phrase).replace(r"\ ", r"\s+") for phrase in plain]
     return typed_numbers(text, [MARKER.pattern, *HIDDEN, *phrases, NAMES, PLACES], NUMBER)
@@ -180,11 +182,13 @@ class Pages:
 
     def tables(self):
         """Returns {path from the root: text} of the table.md of each directory."""
-        return {f"results/{name}/table.md": tables.markdown_report(rows) for name, rows in self.rows.rows_of.items()}
+        return {f"results/{name}/table.md": tables.markdown_report(rows)
+                for name, rows in self.rows.rows_of.items()}
 
     def sums(self):
         """Returns the hashes of all rows.jsonl."""
-        return "".join(hash_line(self.root, name) for name in sorted(self.rows.tables, key=lambda name: name + "/"))
+        return "".join(hash_line(self.root, name)
+                       for name in sorted(self.rows.tables, key=lambda name: name + "/"))
 
     def read(self, file):
         """Returns the text of a file, None if there is none."""
@@ -263,7 +267,8 @@ class Pages:
                 found.append(f"{where}: {right}")
             elif marker["content"] != right:
                 is_short = len(marker["content"]) + len(right) < 200
-                differs = f'is "{marker["content"]}", by the rows "{right}"' if is_short else "differs from the rows"
+                differs = (f'is "{marker["content"]}", by the rows "{right}"' if is_short
+                           else "differs from the rows")
                 found.append(f"{where}: {marker['name']} {differs}")
         plain = self.plain.get("all", []) + self.plain.get(page, [])
         return found + [f"{page}:{line}: {number} comes from no row: give it a marker, or name the phrase in "
@@ -277,11 +282,13 @@ class Pages:
         known = {entry.get("sha256") for case in cases for entry in [case, *case.get("files", [])]} - {None}
         found = set()
         for name, rows in self.rows.rows_of.items():
-            found |= {f"results/{name}: {problem}" for problem in ablations.prediction_problems(rows, self.root)}
+            found |= {f"results/{name}: {problem}"
+                      for problem in ablations.prediction_problems(rows, self.root)}
             for row in rows:
                 for given in [row["case"], *(find(row, "/inputs") or [])]:
-                    is_file, digest = given.get("origin") in ("data folder", "package registry"), given.get("sha256")
+                    is_file, digest = (
+                        given.get("origin") in ("data folder", "package registry"), given.get("sha256"))
                     if is_file and digest not in known:
-                        found.add(f"results/{name}: the input {given.get('name')} has the SHA-256 {digest}, which "
-                                  "experiments/cases.toml does not have")
+                        found.add(f"results/{name}: the input {given.get('name')} has the SHA-256 {digest}, "
+                                  "which experiments/cases.toml does not have")
         return found

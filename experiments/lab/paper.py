@@ -2,7 +2,8 @@
 them.
 
   python3 -m experiments.lab.paper --out DIR     checks the text, writes DIR/numbers.tex and DIR/tables/*.tex
-  python3 -m experiments.lab.paper --verify DIR  lists differences of DIR from the rows, and complaints of LaTeX
+  python3 -m experiments.lab.paper --verify DIR  lists differences of DIR from the rows, and complaints of
+                                                 LaTeX
 
 The exit code is 1 if a number has no row, or its rows are of a tree with changes, stale, or differ from
 results/SHA256SUMS; if the text has a digit that is no number of the rows; or if a file in DIR was edited.
@@ -23,11 +24,16 @@ from .rows import ROOT, LabError, find
 
 SYMBOLS = {
     "×": r"$\times$", "÷": r"$\div$", "°": r"\textdegree{}", "–": "--", "—": "---", "−": "$-$", "→": r"$\to$",
-    "√": r"$\surd$", "²": r"\textsuperscript{2}", "³": r"\textsuperscript{3}", "Δ": r"$\Delta$", "△": r"$\triangle$",
-    "∪": r"$\cup$", "∩": r"$\cap$", "∅": r"$\emptyset$", "≤": r"$\le$", "≥": r"$\ge$", "µ": r"$\mu$", "π": r"$\pi$",
-    "₂": r"\textsubscript{2}", "é": r"\'e", "ö": r'\"o', "ä": r'\"a', "æ": r"\ae{}", "’": "'", "…": r"\dots{}",
-    "§": r"\S{}", "·": r"$\cdot$", "±": r"$\pm$", "⅓": r"$\frac13$", "½": r"$\frac12$", "ᵀ": r"\textsuperscript{T}",
-    "&": r"\&", "%": r"\%", "$": r"\$", "#": r"\#", "_": r"\_", "{": r"\{", "}": r"\}", "~": r"\textasciitilde{}",
+    "√": r"$\surd$", "²": r"\textsuperscript{2}", "³": r"\textsuperscript{3}", "Δ": r"$\Delta$",
+    "△": r"$\triangle$",
+    "∪": r"$\cup$", "∩": r"$\cap$", "∅": r"$\emptyset$", "≤": r"$\le$", "≥": r"$\ge$", "µ": r"$\mu$",
+    "π": r"$\pi$",
+    "₂": r"\textsubscript{2}", "é": r"\'e", "ö": r'\"o', "ä": r'\"a', "æ": r"\ae{}", "’": "'",
+    "…": r"\dots{}",
+    "§": r"\S{}", "·": r"$\cdot$", "±": r"$\pm$", "⅓": r"$\frac13$", "½": r"$\frac12$",
+    "ᵀ": r"\textsuperscript{T}",
+    "&": r"\&", "%": r"\%", "$": r"\$", "#": r"\#", "_": r"\_", "{": r"\{", "}": r"\}",
+    "~": r"\textasciitilde{}",
     "^": r"\textasciicircum{}", "\\": r"\textbackslash{}", "<": r"$<$", ">": r"$>$", "|": r"$|$"}
 WIDEST = 1.0  # points by which a line may be wider than its column
 
@@ -38,7 +44,8 @@ def escaped(text):
     """Returns a text of a row or a rule for LaTeX."""
     for letter in text:
         if letter not in SYMBOLS and ord(letter) > 126:
-            raise LabError(f'there is no LaTeX for the character {letter!r} of "{text}"; add it to lab/paper.py')
+            raise LabError(f'there is no LaTeX for the character {letter!r} of "{text}"; add it to '
+                           f'lab/paper.py')
     return text.translate(str.maketrans(SYMBOLS))
 
 
@@ -55,7 +62,8 @@ def head_of(text, numeric):
     """Returns the head of a column; "|" breaks it into lines."""
     parts = [escaped(part) for part in text.split("|")]
     # The braces keep LaTeX from taking "[s]" for a distance between the lines.
-    return parts[0] if len(parts) == 1 else rf"\shortstack[{'r' if numeric else 'l'}]{{" + r"\\{}".join(parts) + "}"
+    return (parts[0] if len(parts) == 1
+            else rf"\shortstack[{'r' if numeric else 'l'}]{{" + r"\\{}".join(parts) + "}")
 
 
 def changes(lines):
@@ -69,7 +77,8 @@ def changes(lines):
 
 def tabular(columns, lines, rules=()):
     """Returns a table of lines, the head first, with space before those whose index is in `rules`."""
-    out = [rf"\begin{{tabular}}{{@{{}}{columns}@{{}}}}", r"\toprule", " & ".join(lines[0]) + r" \\", r"\midrule"]
+    out = [rf"\begin{{tabular}}{{@{{}}{columns}@{{}}}}", r"\toprule", " & ".join(lines[0]) + r" \\",
+           r"\midrule"]
     for i, line in enumerate(lines[1:], 1):
         out += [r"\addlinespace"] * (i in rules) + [" & ".join(line) + r" \\"]
     return "\n".join([*out, r"\bottomrule", r"\end{tabular}"]) + "\n"
@@ -89,10 +98,12 @@ def sealed(text):
 # ---- Text
 
 _HIDDEN = [
-    r"\\(?:N|T|ref|label|eqref|pageref|cite[pt]?|input|bibliography|bibliographystyle|url|begin|end|texttt)\{[^{}]*\}",
+    r"\\(?:N|T|ref|label|eqref|pageref|cite[pt]?|input|bibliography|bibliographystyle|url|begin|end|texttt)"
+    r"\{[^{}]*\}",
     r"\\(?:includegraphics|picture)(?:\[[^\]]*\])?\{[^{}]*\}",
-    r"\\(?:vspace|hspace|setlength|addtolength)\*?\{[^{}]*\}(?:\{[^{}]*\})?", r"\{[\d.]*\\(?:text|line|column)width\}",
-    r"\\\\\[[^\]]*\]", r"[_^]\{?\d\}?", pages.PLACES, r"\\[A-Za-z]+"]
+    r"\\(?:vspace|hspace|setlength|addtolength)\*?\{[^{}]*\}(?:\{[^{}]*\})?",
+    r"\{[\d.]*\\(?:text|line|column)width\}", r"\\\\\[[^\]]*\]", r"[_^]\{?\d\}?", pages.PLACES,
+    r"\\[A-Za-z]+"]
 
 
 def orphans(text, plain, start=0):
@@ -158,8 +169,8 @@ class Paper:
         found, plain = [], self.settings.get("plain", [])
         for name, text in self.sources().items():
             start = max(text.find(r"\begin{document}"), 0)
-            found += [f"{name}:{line}: the number {number} is typed, not taken from results/; use \\N{{…}}, or add the "
-                      "phrase to paper/paper.toml" for line, number in orphans(text, plain, start)]
+            found += [f"{name}:{line}: the number {number} is typed, not taken from results/; use \\N{{…}}, "
+                      "or add the phrase to paper/paper.toml" for line, number in orphans(text, plain, start)]
         return found
 
     @functools.cache
@@ -175,9 +186,9 @@ class Paper:
         accepted = self.settings.get("changed", {}).get(table, {}).get("labels", [])
         for experiment, commit, labels in changed_since(self.root, rows):
             if left := [label for label in labels if label not in accepted]:
-                raise LabError(f"results/{table} is stale: {experiment}.toml has changed {', '.join(left)} since "
-                               f"commit {commit[:12]} made the rows; run it again, or state in paper/paper.toml "
-                               "why they may be cited")
+                raise LabError(f"results/{table} is stale: {experiment}.toml has changed {', '.join(left)} "
+                               f"since commit {commit[:12]} made the rows; run it again, or state in "
+                               "paper/paper.toml why they may be cited")
 
     def trust(self, query):
         """Raises LabError if the query reads rows that must not be cited, or none."""
@@ -224,7 +235,8 @@ class Paper:
         if name == "ablations":
             return str(len(self.effects))
         if kind == "ablations" and verdict in ablations.VERDICTS:
-            return str(sum(effect["verdict"].startswith(verdict) for effects in self.effects for effect in effects))
+            return str(sum(effect["verdict"].startswith(verdict) for effects in self.effects
+                           for effect in effects))
         for claim, judged in self.verdicts if kind == "claim" else []:
             for column, value in judged.values.items():
                 if name == f"claim {claim.id} {column}":
@@ -263,15 +275,18 @@ class Paper:
             heads, rows = self.rows.query(query)
             found += rows
         if not found:
-            raise LabError(f"it has no row: {queries[0] if queries else 'there is no results/' + entry['folders']}")
+            raise LabError(f"it has no row: "
+                           f"{queries[0] if queries else 'there is no results/' + entry['folders']}")
         return heads, found
 
     def table_of_effects(self, most):
-        lines = [["factor", "level", "against", "column", head_of("effect|(95 %)", False), "predicted", "verdict"]]
+        lines = [["factor", "level", "against", "column", head_of("effect|(95 %)", False), "predicted",
+                  "verdict"]]
         for effect in (effect for effects in self.effects for effect in effects[:most]):
             column = effect["column"] + (", −" if effect["measure"] == "difference" else ", ÷")
             size = f"{effect['effect']} ({effect['95 % interval']})"
-            lines.append([escaped(cell) for cell in (effect["factor"], effect["level"], effect["against"], column, size,
+            lines.append([escaped(cell)
+                          for cell in (effect["factor"], effect["level"], effect["against"], column, size,
                                                      effect["predicted"], effect["verdict"])])
         return tabular(paragraphs(0.2, 0.13, 0.1, 0.14, 0.15, 0.09, 0.08), lines, changes(lines))
 
@@ -314,11 +329,13 @@ class Paper:
                 try:
                     made[kind, name] = self.number(name) if kind == "N" else self.table(name)
                 except LabError as error:
-                    raise LabError(f"{where}: the {'number' if kind == 'N' else 'table'} {name}: {error}") from None
+                    raise LabError(
+                        f"{where}: the {'number' if kind == 'N' else 'table'} {name}: {error}") from None
         files = {"numbers.tex": "".join(rf"\papernumber{{{name}}}{{{text}}}" + "\n"
                                         for (kind, name), text in made.items() if kind == "N"),
                  **{f"tables/{name}.tex": text for (kind, name), text in made.items() if kind == "T"},
-                 "sections.tex": "".join(rf"\input{{sections/{name}}}" + "\n" for name in self.settings["sections"])}
+                 "sections.tex": "".join(rf"\input{{sections/{name}}}" + "\n"
+                                         for name in self.settings["sections"])}
         return {name: sealed(text) for name, text in files.items()}
 
     def write(self, out):
@@ -347,7 +364,8 @@ class Paper:
             path = pathlib.Path(out) / name
             text = path.read_text() if path.exists() else ""
             lines = zip(text.splitlines()[1:], right.splitlines()[1:])
-            differing = [f'has "{line}", by the rows it is "{wanted}"' for line, wanted in lines if line != wanted]
+            differing = [f'has "{line}", by the rows it is "{wanted}"' for line, wanted in lines
+                         if line != wanted]
             if text != right:
                 found.append(f"{path} {differing[0] if differing else 'is missing, or was edited'}")
         return found
@@ -364,13 +382,15 @@ def changed_since(root, rows):
     for commit, experiment in sorted({(row["commit"], row["experiment"]) for row in rows}):
         path = min((root / "experiments").glob(f"**/{experiment}.toml"), default=None)
         there = git("ls-tree", "-r", "--name-only", commit, "experiments").stdout.split("\n")
-        old = next((name for name in there if name.endswith(f"/{experiment}.toml")), "")  # files move between commits
+        # files move between commits
+        old = next((name for name in there if name.endswith(f"/{experiment}.toml")), "")
         if not (path and old):
             continue
         before, after = tomllib.loads(git("show", f"{commit}:{old}").stdout), tomllib.loads(path.read_text())
         labels = {find(row, "/variant/label") for row in rows if row["commit"] == commit}
         for key in ("variants", "voxelizers"):
-            was, now = ({v if isinstance(v, str) else v.get("label", v.get("name")): v for v in file.get(key, [])}
+            was, now = ({v if isinstance(v, str) else v.get("label", v.get("name")): v
+                         for v in file.get(key, [])}
                         for file in (before, after))
             if other := sorted(label for label in labels & set(was) if was[label] != now.get(label)):
                 found.append((experiment, commit, other))
@@ -390,7 +410,8 @@ def check_log(out):
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(description=__doc__,
+                                     formatter_class=argparse.RawDescriptionHelpFormatter)
     action = parser.add_mutually_exclusive_group(required=True)
     action.add_argument("--out", type=pathlib.Path)
     action.add_argument("--verify", type=pathlib.Path)

@@ -162,7 +162,8 @@ class RowGroup:
     """
 
     rows: list
-    earlier_runs: int = 0  # number of groups that differ from this one only in the run, and are not part of it
+    # number of groups that differ from this one only in the run, and are not part of it
+    earlier_runs: int = 0
 
 
 def latest_groups(rows):

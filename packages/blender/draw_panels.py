@@ -1,8 +1,9 @@
-"""Draws the panels: xvfb-run -a -s "-screen 0 1280x1300x24" blender --factory-startup -p 0 0 1280 1300 --python draw_panels.py --
-FOLDER
+"""Draws the panels: xvfb-run -a -s "-screen 0 1280x1300x24" blender --factory-startup -p 0 0 1280 1300
+--python draw_panels.py -- FOLDER
 
-Writes FOLDER/panels.png, the sidebar as it is at first, with options chosen, at work, judged and with an error, and
-FOLDER/window.png, with the pieces of what was worked on: the Dragon of $HERMESH_DATA, or without it a ball with holes.
+Writes FOLDER/panels.png, the sidebar as it is at first, with options chosen, at work, judged and with an
+error, and FOLDER/window.png, with the pieces of what was worked on: the Dragon of $HERMESH_DATA, or without
+it a ball with holes.
 """
 
 import gzip
@@ -38,7 +39,8 @@ def choose_tab():
     """Clicks on the second tab, since scripts cannot choose one."""
     sidebar = in_window.view()[1]
     x, y = sidebar.x + sidebar.width - 14, sidebar.y + sidebar.height - 84
-    for step in (lambda: in_window.move_mouse(x, y), lambda: in_window.xdotool("click", "1"), lambda: in_window.move_mouse(400, y)):
+    for step in (lambda: in_window.move_mouse(x, y), lambda: in_window.xdotool("click", "1"),
+                 lambda: in_window.move_mouse(400, y)):
         step()
         yield 0.5
 
@@ -60,7 +62,8 @@ def pixels(of_sidebar):
         return shot
     left, below = sidebar.x - area.x, sidebar.y - area.y
     shot = shot[below:below + sidebar.height, left:left + sidebar.width]
-    # Below the last panel there is the background alone, all but even along rows; the tab at the right edge does not count.
+    # Below the last panel there is only the background, nearly uniform along rows; the tab at the right edge
+    # does not count.
     used = np.flatnonzero(np.ptp(shot[:, :-30, 0], axis=1) > 0.1)
     return shot[max(0, used[0] - 6):]
 
@@ -95,7 +98,8 @@ def model():
             pathlib.Path(path).write_bytes(gzip.decompress(dragon.read_bytes()))
             bpy.ops.import_mesh.ply(filepath=path)
         item = bpy.context.active_object
-        item.scale, item.rotation_euler, item.location = (20.0, 20.0, 20.0), (np.pi / 2, 0.0, 0.3), (0.0, 0.0, -2.5)
+        item.scale, item.rotation_euler, item.location = (
+            (20.0, 20.0, 20.0), (np.pi / 2, 0.0, 0.3), (0.0, 0.0, -2.5))
     else:
         bpy.ops.mesh.primitive_uv_sphere_add(segments=48, ring_count=24, radius=1.5)
         item = bpy.context.active_object
@@ -133,7 +137,8 @@ def steps():
 
     shots = [pixels(True)]
     settings.other, settings.file, settings.mask = hammer, "/tmp/dragon.vdb", "camera"
-    settings.size_by, settings.voxel_size, settings.cutters, settings.at_cursor = "voxel_size", 0.05, "chunks", True
+    settings.size_by, settings.voxel_size, settings.cutters, settings.at_cursor = (
+        "voxel_size", 0.05, "chunks", True)
     yield 0.5
     shots.append(pixels(True))
 

@@ -1,8 +1,9 @@
 """Blender add-on: volumes, remeshing, Booleans, fracture and judges of hermesh on the active object.
 
-For Blender 3.4 with the interpreter of the system (Debian), which finds the Python module hermesh. Each operator works in a thread
-while Blender stays responsive: the status bar and the panel show progress, Escape cancels, and undo takes the result back. Without
-a display (`blender -b`), or called with EXEC_DEFAULT, an operator waits for its end.
+For Blender 3.4 with the interpreter of the system (Debian), which finds the Python module hermesh. Each
+operator works in a thread while Blender stays responsive: the status bar and the panel show progress, Escape
+cancels, and undo takes the result back. Without a display (`blender -b`), or called with EXEC_DEFAULT, an
+operator waits for its end.
 """
 
 import textwrap
@@ -11,8 +12,8 @@ import time
 
 import bpy
 import numpy as np
-from bpy.props import (BoolProperty, CollectionProperty, EnumProperty, FloatProperty, IntProperty, PointerProperty,
-                       StringProperty)
+from bpy.props import (BoolProperty, CollectionProperty, EnumProperty, FloatProperty, IntProperty,
+                       PointerProperty, StringProperty)
 
 bl_info = {
     "name": "hermesh",
@@ -28,8 +29,8 @@ bl_info = {
 
 
 def mesh_of(context, item):
-    """The object's polygons as they are shown, with modifiers and numbers on faces, in world units, and for each triangle the
-    polygon of the object that it is of."""
+    """Returns the object's polygons as displayed, with modifiers and face attributes, in world units, and for
+    each triangle its polygon of the object."""
     import hermesh
     shown = item.evaluated_get(context.evaluated_depsgraph_get())
     mesh = shown.to_mesh()
@@ -45,8 +46,10 @@ def mesh_of(context, item):
         mesh.loop_triangles.foreach_get("polygon_index", polygons)
         attributes = {}
         for attribute in mesh.attributes:
-            if attribute.domain == "FACE" and attribute.data_type in ("INT", "FLOAT") and not attribute.name.startswith("."):
-                values = np.empty(len(mesh.polygons), np.int32 if attribute.data_type == "INT" else np.float32)
+            if (attribute.domain == "FACE" and attribute.data_type in ("INT", "FLOAT")
+                    and not attribute.name.startswith(".")):
+                values = np.empty(len(mesh.polygons),
+                                  np.int32 if attribute.data_type == "INT" else np.float32)
                 attribute.data.foreach_get("value", values)
                 attributes[attribute.name] = values[polygons]
     finally:
@@ -58,7 +61,7 @@ def mesh_of(context, item):
 
 
 def data_of(mesh, name):
-    """A new mesh of Blender's of a hermesh.Mesh, in world units, with its attributes of polygons."""
+    """Returns a new Blender mesh from a hermesh.Mesh, in world units, with its polygon attributes."""
     data = bpy.data.meshes.new(name)
     points, triangles, quads = mesh.world_points().astype(np.float32), mesh.triangles, mesh.quads
     data.vertices.add(len(points))
@@ -91,27 +94,30 @@ def add_object(context, mesh, name, like):
 
 
 class Camera:
-    """What the scene's camera sees, read from Blender; polygons() works without Blender's data."""
+    """The view of the scene's camera, read from Blender; polygons() works without Blender's data."""
 
     def __init__(self, scene):
         if scene.camera is None or scene.camera.type != "CAMERA":
             raise ValueError("the scene has no camera whose view could be the mask")
         data = scene.camera.data
         if data.type == "PANO":
-            raise ValueError("a panoramic camera's view is no frustum; choose another camera or an object for the mask")
+            raise ValueError("a panoramic camera's view is no frustum; choose another camera or an object "
+                             "for the mask")
         self.is_perspective, self.near, self.far = data.type == "PERSP", data.clip_start, data.clip_end
-        self.frame = np.array(data.view_frame(scene=scene))  # corners of the picture in the camera's space, which looks along -z
+        # corners of the picture in the camera's space, which looks along -z
+        self.frame = np.array(data.view_frame(scene=scene))
         # The camera's scale does not change its view.
         self.placement = np.array(scene.camera.matrix_world.normalized())
 
     def polygons(self, box):
-        """Points and quads of the frustum as far as it is about the box, whose eight corners are given, all in world units. Its
-        ends need not be farther off, and a mask of few voxels is then fine enough."""
+        """Returns points and quads of the part of the frustum around the box with the given eight corners, in
+        world units. Nearer ends make a mask of few voxels fine enough."""
         depths = -(box - self.placement[:3, 3]) @ self.placement[:3, 2]
         margin = 0.05 * np.ptp(box, axis=0).max()
         near, far = max(self.near, depths.min() - margin), min(self.far, depths.max() + margin)
         if near >= far:
-            raise ValueError("the camera sees nothing of the object: it is behind the camera or beyond its clipping distances")
+            raise ValueError("the camera sees nothing of the object: it is behind the camera or beyond its "
+                             "clipping distances")
         ends = []
         for depth in (near, far):
             end = self.frame.copy()
@@ -120,7 +126,8 @@ class Camera:
             end[:, 2] = -depth
             ends.append(end)
         points = np.concatenate(ends) @ self.placement[:3, :3].T + self.placement[:3, 3]
-        # The picture's corners go round clockwise as the camera sees them, so that the near end, which looks at it, is turned over.
+        # The picture's corners are clockwise seen from the camera, so the near end, which faces it, is
+        # reversed.
         sides = [[i, (i + 1) % 4, (i + 1) % 4 + 4, i + 4] for i in range(4)]
         return points, np.array([[3, 2, 1, 0], [4, 5, 6, 7]] + sides)
 
@@ -130,8 +137,9 @@ def corners(lower, upper):
 
 
 def mask_of(context):
-    """A function that makes the options of a mask of the corners of a box (world units) about the surface, of the matrix that takes
-    the world to where the mask is needed, and of what watches; it works without Blender's data."""
+    """Returns a function that makes the options of a mask, given the corners of a box (world units) around
+    the surface, the matrix from the world to the mask's space, and the watching options; it works without
+    Blender's data."""
     settings = context.scene.hermesh
     if settings.mask == "none":
         return lambda box, matrix, watching: {}
@@ -152,7 +160,8 @@ def mask_of(context):
         points = points @ matrix[:3, :3].T + matrix[:3, 3]
         if np.linalg.det(matrix[:3, :3]) < 0:
             sides = sides[:, ::-1]  # a mirror turns polygons over
-        return dict(mask=hermesh.voxelize((points, sides), resolution=resolution, **watching), outside=outside)
+        return dict(mask=hermesh.voxelize((points, sides), resolution=resolution, **watching),
+                    outside=outside)
 
     return make
 
@@ -161,8 +170,8 @@ def mask_of(context):
 
 
 class Said:
-    """It is not kept in the scene, since each property that is set there has all windows drawn anew, and undo would bring old
-    errors back."""
+    """Not stored in the scene, because setting a property there redraws all windows, and undo would restore
+    old errors."""
 
     def __init__(self):
         self.errors, self.notes, self.work, self.title = [], [], None, ""
@@ -187,11 +196,12 @@ def draw_sidebars(context):
 
 
 class Work:
-    """A call of hermesh in a thread of its own."""
+    """A call of hermesh in its own thread."""
 
     def __init__(self, call):
         import hermesh
-        self.cancel, self.said, self.result, self.error, self.ended = threading.Event(), ("", 0.0), None, None, None
+        self.cancel, self.said, self.result, self.error, self.ended = (
+            threading.Event(), ("", 0.0), None, None, None)
         self.log = hermesh.Log()
 
         def run():
@@ -214,8 +224,8 @@ class Work:
 
 
 class Operator:
-    """What the operators share. prepare() reads Blender's data of the object and returns a call that works on hermesh's alone;
-    finish() puts its result into the scene."""
+    """Base of the operators. prepare() reads Blender's data of the object and returns a call that works only
+    on hermesh's data; finish() puts its result into the scene."""
     bl_options = {"REGISTER", "UNDO"}
     kind = "MESH"
     drawing_share = 0.1  # of the time, at most, goes into drawing progress: who draws does not hear Escape
@@ -224,7 +234,8 @@ class Operator:
     def poll(cls, context):
         if said.work is not None:
             cls.poll_message_set("wait for what is at work, or cancel it with Escape")
-        elif context.mode != "OBJECT" or context.active_object is None or context.active_object.type != cls.kind:
+        elif (context.mode != "OBJECT" or context.active_object is None
+              or context.active_object.type != cls.kind):
             cls.poll_message_set(f"make a {cls.kind.lower()} the active object, in Object Mode")
         else:
             return True
@@ -276,7 +287,8 @@ class Operator:
         if not self.begin(context):
             draw_sidebars(context)
             return {"CANCELLED"}
-        self.shown, self.drawn, self.next_drawing = "", None, time.monotonic() + 0.3  # what is short needs none
+        # short work needs no drawing
+        self.shown, self.drawn, self.next_drawing = "", None, time.monotonic() + 0.3
         self.timer = context.window_manager.event_timer_add(0.05, window=context.window)
         context.window_manager.modal_handler_add(self)
         return {"RUNNING_MODAL"}
@@ -294,8 +306,8 @@ class Operator:
         return self.end(context)
 
     def draw_progress(self, context):
-        """Has the status bar and the sidebars drawn, which takes the whole window: milliseconds on a graphics card, tenths of a
-        second where a processor draws that is busy besides."""
+        """Redraws the status bar and the sidebars. This redraws the whole window: milliseconds on a graphics
+        card, tenths of a second with software rendering on a busy processor."""
         now = time.monotonic()
         if self.drawn is not None:
             self.next_drawing = now + max(0.1, (now - self.drawn) / self.drawing_share)
@@ -311,7 +323,7 @@ class Operator:
         context.workspace.status_text_set(None)
 
     def cancel(self, context):
-        """Blender calls it where it ends the operator, such as for another file."""
+        """Blender calls it when it ends the operator, e.g. to open another file."""
         self.work.cancel.set()
         self.work.thread.join()
         said.work = None
@@ -321,7 +333,8 @@ class Operator:
 class HERMESH_OT_volume(Operator, bpy.types.Operator):
     """Write the level set of the active object to a .vdb file and show it"""
     bl_idname, bl_label = "hermesh.volume", "Polygons to Volume"
-    filepath: StringProperty(subtype="FILE_PATH", description="The .vdb file that is written; the panel's if it is empty")
+    filepath: StringProperty(subtype="FILE_PATH",
+                             description="The .vdb file that is written; the panel's if it is empty")
 
     def prepare(self, context, item):
         import hermesh
@@ -330,7 +343,8 @@ class HERMESH_OT_volume(Operator, bpy.types.Operator):
         if not path.endswith(".vdb"):
             raise ValueError("say which .vdb file the volume is written to")
         if path.startswith("//") and not bpy.data.filepath:
-            raise ValueError("a path that begins with // is one beside the .blend file, which has not been saved yet")
+            raise ValueError("a path that begins with // is one beside the .blend file, which has not been "
+                             "saved yet")
         path = bpy.path.abspath(path)
         mesh, options = mesh_of(context, item)[0], settings.voxelizing()
         options.update(exterior_band=settings.exterior_band, interior_band=settings.interior_band)
@@ -345,7 +359,7 @@ class HERMESH_OT_volume(Operator, bpy.types.Operator):
     def finish(self, context, item, path):
         known = [other for other in bpy.data.volumes if bpy.path.abspath(other.filepath) == path]
         if known:
-            # Blender keeps a file's grids as long as any volume has them, so that all let go of them first.
+            # Blender keeps a file's grids while any volume uses them, so all volumes release them first.
             for written in ("", path):
                 for other in known:
                     other.filepath = written
@@ -368,14 +382,15 @@ class HERMESH_OT_remesh(Operator, bpy.types.Operator):
         if not len(points):
             raise ValueError("the object has no polygons")
         box = corners(points.min(0), points.max(0))
-        return lambda **watching: hermesh.remesh(mesh, **options, **mask(box, np.eye(4), watching), **watching)
+        return lambda **watching: hermesh.remesh(mesh, **options, **mask(box, np.eye(4), watching),
+                                                 **watching)
 
     def finish(self, context, item, mesh):
         replace(item, mesh)
 
 
 def replace(item, mesh):
-    """Gives the object a mesh that is in world units; where it stands and what modifies it is in the mesh."""
+    """Gives the object a mesh in world units, which includes its transform and modifiers."""
     data = data_of(mesh, item.data.name)
     for material in item.data.materials:
         data.materials.append(material)
@@ -397,8 +412,10 @@ class HERMESH_OT_extract(Operator, bpy.types.Operator):
         grids = item.data.grids
         if not grids.load() or not len(grids):
             raise ValueError(grids.error_message or "the volume has no grid")
-        path, name = grids.frame_filepath or bpy.path.abspath(item.data.filepath), grids[grids.active_index].name
-        tolerance, isovalue, mask, matrix = settings.tolerance, settings.isovalue, mask_of(context), np.array(item.matrix_world)
+        path, name = (
+            grids.frame_filepath or bpy.path.abspath(item.data.filepath), grids[grids.active_index].name)
+        tolerance, isovalue, mask, matrix = (
+            settings.tolerance, settings.isovalue, mask_of(context), np.array(item.matrix_world))
 
         def call(**watching):
             volume = hermesh.read_vdb(path, grid=name, **watching)
@@ -407,8 +424,8 @@ class HERMESH_OT_extract(Operator, bpy.types.Operator):
             for placement in (volume.placement, matrix):
                 box = box @ placement[:3, :3].T + placement[:3, 3]
             masked = mask(box, np.linalg.inv(matrix), watching)
-            return hermesh.extract(volume, extractor="manifold-dual-contouring", isovalue=isovalue, tolerance=tolerance, **masked,
-                                   **watching)
+            return hermesh.extract(volume, extractor="manifold-dual-contouring", isovalue=isovalue,
+                                   tolerance=tolerance, **masked, **watching)
 
         return call
 
@@ -456,7 +473,8 @@ class HERMESH_OT_fracture(Operator, bpy.types.Operator):
         else:
             options.update(cutters=f"{settings.cutters}:{settings.pieces}", roughness=settings.roughness)
         if settings.at_cursor:
-            options.update(impact=tuple(context.scene.cursor.location), impact_radius=settings.impact_radius or None)
+            options.update(impact=tuple(context.scene.cursor.location),
+                           impact_radius=settings.impact_radius or None)
         return lambda **watching: hermesh.fracture(mesh, **options, **watching)
 
     def finish(self, context, item, fracture):
@@ -503,7 +521,8 @@ class HERMESH_OT_show_defect(bpy.types.Operator):
     @classmethod
     def poll(cls, context):
         item = context.scene.hermesh.judged
-        return said.work is None and item is not None and context.mode in ("OBJECT", "EDIT_MESH") and item.visible_get()
+        return (said.work is None and item is not None and context.mode in ("OBJECT", "EDIT_MESH")
+                and item.visible_get())
 
     def execute(self, context):
         settings = context.scene.hermesh
@@ -554,32 +573,36 @@ class HermeshDefect(bpy.types.PropertyGroup):
 
 class HermeshSettings(bpy.types.PropertyGroup):
     size_by: EnumProperty(name="Voxels by", items=[
-        ("resolution", "Resolution", "Their number along the longest side of the object says how large voxels are"),
+        ("resolution", "Resolution",
+         "Their number along the longest side of the object says how large voxels are"),
         ("voxel_size", "Voxel Size", "Their edge says how large voxels are"),
     ], description="What says how large voxels are")
     resolution: IntProperty(name="Resolution", default=100, min=1, soft_max=1000,
                             description="Voxels along the longest side of the object")
-    voxel_size: FloatProperty(name="Voxel Size", default=0.02, min=1e-6, soft_min=0.001, soft_max=1.0, precision=4, unit="LENGTH",
-                              description="Edge of a voxel")
+    voxel_size: FloatProperty(name="Voxel Size", default=0.02, min=1e-6, soft_min=0.001, soft_max=1.0,
+                              precision=4, unit="LENGTH", description="Edge of a voxel")
     signs: EnumProperty(name="Inside", items=[
         ("auto", "Auto", "Flood fill, or winding numbers where the mesh is open"),
         ("flood-fill", "Flood Fill", "What the outside does not reach"),
         ("winding-number", "Winding Number", "For meshes with holes, and for polygons that intersect"),
     ], description="How the inside of polygons is found")
-    file: StringProperty(name="File", subtype="FILE_PATH", description="The .vdb file that the volume is written to")
+    file: StringProperty(name="File", subtype="FILE_PATH",
+                         description="The .vdb file that the volume is written to")
     exterior_band: FloatProperty(name="Ext. Band", default=3.0, min=1.0, soft_max=20.0,
                                  description="Voxels outside the surface that have their distance")
     interior_band: FloatProperty(name="Int. Band", default=3.0, min=1.0, soft_max=20.0,
                                  description="Voxels inside the surface that have their distance")
     tolerance: FloatProperty(name="Tolerance", default=0.1, min=0.0, soft_max=2.0,
                              description="Voxels that the mesh may be from the finest one")
-    isovalue: FloatProperty(name="Isovalue", description="Value of the volume on the surface; 0 for level sets")
+    isovalue: FloatProperty(name="Isovalue",
+                            description="Value of the volume on the surface; 0 for level sets")
     mask: EnumProperty(name="Mask", items=[
         ("none", "None", "The tolerance holds everywhere"),
         ("object", "Object", "The tolerance holds inside an object"),
         ("camera", "Camera", "The tolerance holds in what the scene's camera sees"),
     ], description="Where the tolerance holds")
-    mask_object: PointerProperty(name="Object", type=bpy.types.Object, poll=is_mesh, description="The tolerance holds inside it")
+    mask_object: PointerProperty(name="Object", type=bpy.types.Object, poll=is_mesh,
+                                 description="The tolerance holds inside it")
     mask_resolution: IntProperty(name="Mask Voxels", default=84, min=8, soft_max=500, max=4096,
                                  description="Voxels along the mask's longest side")
     outside: EnumProperty(name="Outside", items=[
@@ -591,7 +614,8 @@ class HermeshSettings(bpy.types.PropertyGroup):
         ("intersection", "Intersect", "What is in both solids"),
         ("difference", "Difference", "The active object without the other one"),
     ], default="difference")
-    other: PointerProperty(name="With", type=bpy.types.Object, poll=is_mesh, description="The other solid; it stays as it is")
+    other: PointerProperty(name="With", type=bpy.types.Object, poll=is_mesh,
+                           description="The other solid; it stays as it is")
     cutters: EnumProperty(name="Cutters", items=[
         ("voronoi", "Voronoi", "Cells about scattered points"),
         ("chunks", "Chunks", "Cells with rough walls"),
@@ -600,10 +624,12 @@ class HermeshSettings(bpy.types.PropertyGroup):
     ])
     pieces: IntProperty(name="Number", default=10, min=1, soft_max=200, description="Cells or planes")
     roughness: FloatProperty(name="Roughness", default=0.12, min=0.0, max=1.0,
-                             description="How far walls are displaced, as a part of the distance of the points")
+                             description="How far walls are displaced, as a part of the distance of the "
+                                         "points")
     cutter: PointerProperty(name="Object", type=bpy.types.Object, poll=is_mesh,
                             description="The object that cuts; it stays as it is")
-    copies: IntProperty(name="Copies", min=0, soft_max=50, description="Scattered and turned at random; 0: it cuts where it is")
+    copies: IntProperty(name="Copies", min=0, soft_max=50,
+                        description="Scattered and turned at random; 0: it cuts where it is")
     seed: IntProperty(name="Seed", min=0, description="Of everything random")
     at_cursor: BoolProperty(name="At Cursor", description="Smallest pieces about the 3D cursor")
     impact_radius: FloatProperty(name="Radius", min=0.0, unit="LENGTH",
@@ -614,7 +640,8 @@ class HermeshSettings(bpy.types.PropertyGroup):
     defects: CollectionProperty(type=HermeshDefect)
 
     def voxelizing(self):
-        size = dict(resolution=self.resolution) if self.size_by == "resolution" else dict(voxel_size=self.voxel_size)
+        size = (dict(resolution=self.resolution) if self.size_by == "resolution"
+                else dict(voxel_size=self.voxel_size))
         return dict(size, signs=self.signs)
 
     def meshing(self):
@@ -622,8 +649,8 @@ class HermeshSettings(bpy.types.PropertyGroup):
 
 
 def wrapped(context, layout, text, icon="NONE", taken=90):
-    """Draws a text in as many lines as the sidebar's width asks for, since Blender cuts lines off; `taken` of its pixels is for
-    margins, the icon and what is beside the text."""
+    """Draws a text in as many lines as the sidebar's width requires, since Blender truncates lines; `taken`
+    pixels of it are for margins, the icon and other items next to the text."""
     width = max(12, int((context.region.width / context.preferences.system.ui_scale - taken) / 6.3))
     column = layout.column(align=True)
     column.scale_y = 0.75
@@ -647,7 +674,8 @@ class HERMESH_PT_panel(Panel, bpy.types.Panel):
     def draw(self, context):
         settings, layout = context.scene.hermesh, self.column()[1]
         if said.work is not None:
-            wrapped(context, layout.box(), f"{said.title}: {said.work.sentence()}\nEscape cancels", "SORTTIME")
+            wrapped(context, layout.box(), f"{said.title}: {said.work.sentence()}\nEscape cancels",
+                    "SORTTIME")
         for texts, icon in ((said.errors, "ERROR"), (said.notes, "INFO")):
             for text in texts:
                 row = layout.box().row()
@@ -743,7 +771,7 @@ class HERMESH_PT_judge(SubPanel, bpy.types.Panel):
         box = layout.box()
         if settings.judged is not None:
             box.label(text=settings.judged.name, icon="OBJECT_DATA")
-        # The other sentences describe the positions of the defects, which their buttons show.
+        # The other messages describe the positions of the defects, which their buttons show.
         text = settings.verdict if settings.is_well else settings.verdict.splitlines()[0]
         wrapped(context, box, text, "CHECKMARK" if settings.is_well else "ERROR")
         if settings.defects:
@@ -753,12 +781,14 @@ class HERMESH_PT_judge(SubPanel, bpy.types.Panel):
                 row.label(text=f"{defect.count:,} {defect.name}")
                 button = row.row()
                 button.enabled = bool(defect.polygons)
-                button.operator(HERMESH_OT_show_defect.bl_idname, text="", icon="RESTRICT_SELECT_OFF").index = index
+                button.operator(HERMESH_OT_show_defect.bl_idname, text="",
+                                icon="RESTRICT_SELECT_OFF").index = index
 
 
-classes = (HermeshDefect, HermeshSettings, HERMESH_OT_volume, HERMESH_OT_remesh, HERMESH_OT_extract, HERMESH_OT_combine,
-           HERMESH_OT_fracture, HERMESH_OT_judge, HERMESH_OT_show_defect, HERMESH_OT_dismiss, HERMESH_PT_panel, HERMESH_PT_volume,
-           HERMESH_PT_mesh, HERMESH_PT_boolean, HERMESH_PT_fracture, HERMESH_PT_judge)
+classes = (HermeshDefect, HermeshSettings, HERMESH_OT_volume, HERMESH_OT_remesh, HERMESH_OT_extract,
+           HERMESH_OT_combine, HERMESH_OT_fracture, HERMESH_OT_judge, HERMESH_OT_show_defect,
+           HERMESH_OT_dismiss, HERMESH_PT_panel, HERMESH_PT_volume, HERMESH_PT_mesh, HERMESH_PT_boolean,
+           HERMESH_PT_fracture, HERMESH_PT_judge)
 
 
 def register():

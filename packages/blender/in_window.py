@@ -1,4 +1,5 @@
-"""What scripts share that work in Blender's window, such as one of xvfb-run, step by step between its drawings."""
+"""Helpers of scripts that control Blender in a window, such as one of xvfb-run, step by step between its
+redraws."""
 
 import os
 import subprocess
@@ -10,7 +11,8 @@ import bpy
 
 def view(window=None):
     """The window's 3D view, and its sidebar's region."""
-    area = next(area for area in (window or bpy.context.window_manager.windows[0]).screen.areas if area.type == "VIEW_3D")
+    area = next(area for area in (window or bpy.context.window_manager.windows[0]).screen.areas
+                if area.type == "VIEW_3D")
     return area, next(region for region in area.regions if region.type == "UI")
 
 
@@ -23,14 +25,17 @@ def in_view():
 
 
 def xdotool(*words):
-    """Keys and clicks as of a keyboard and a mouse; without a window manager the window under the mouse gets the keys."""
+    """Sends keys and clicks like a keyboard and a mouse; without a window manager the window under the mouse
+    gets the keys."""
     subprocess.run(["xdotool", *words], check=True)
 
 
 def move_mouse(x, y):
-    """To a place in pixels from the window's lower left, as Blender says where its regions are; the window may be anywhere."""
+    """Moves the mouse to a position in pixels from the window's lower left, like Blender's coordinates of
+    regions; the window may be anywhere."""
     height = bpy.context.window_manager.windows[0].height
-    xdotool("search", "--onlyvisible", "--class", "Blender", "mousemove", "--window", "%1", str(x), str(height - y))
+    xdotool("search", "--onlyvisible", "--class", "Blender", "mousemove", "--window", "%1", str(x),
+            str(height - y))
 
 
 def clear():
@@ -39,8 +44,8 @@ def clear():
 
 
 def run(steps):
-    """Goes through the steps, a generator of the seconds to wait before the next one, while Blender's window lives, then ends
-    Blender: with 1 where a step raises anything."""
+    """Runs the steps, a generator of the seconds to wait before the next one, while Blender's window is open,
+    then ends Blender, with 1 if a step raises an exception."""
 
     def step():
         try:

@@ -1,8 +1,9 @@
-"""A session in a real Blender without a display: blender -b --factory-startup --python-exit-code 1 --python session_test.py
-[-- dragon]
+"""A session in a real Blender without a display: blender -b --factory-startup --python-exit-code 1 --python
+session_test.py [-- dragon]
 
-A mesh is imported, made a volume and a mesh again, remeshed, combined, broken and judged, and all is undone: a ball that the script
-makes, or the Dragon of $HERMESH_DATA. Any assertion that fails ends Blender with 1.
+A mesh is imported, converted to a volume and back, remeshed, combined, broken and validated, and everything
+is undone: a ball that the script makes, or the Dragon of $HERMESH_DATA. A failed assertion ends Blender with
+    1.
 """
 
 import gzip
@@ -110,7 +111,8 @@ is_done(bpy.ops.hermesh.volume())
 assert not hermesh_blender.said.errors
 volumes = [item for item in bpy.data.objects if item.type == "VOLUME"]
 assert len(volumes) == 1 and volumes[0].name == "model volume"
-assert volumes[0].data.grids.load() and abs(volumes[0].data.grids[0].matrix_object[0][0] / (2 * voxel) - 1) < 1e-4
+assert (volumes[0].data.grids.load()
+        and abs(volumes[0].data.grids[0].matrix_object[0][0] / (2 * voxel) - 1) < 1e-4)
 # Written again, it is the same object, and Blender reads the new file.
 settings.resolution = resolution
 is_done(bpy.ops.hermesh.volume())
@@ -192,11 +194,12 @@ camera.data.type, camera.data.shift_x, camera.data.clip_end, camera.data.lens = 
 bpy.context.view_layer.update()
 ours = extracted(outside="nothing")[0]
 eye = centre - [0.0, 2 * extent, 0.0]
-angle = np.degrees(2 * np.arctan(np.tan(camera.data.angle_x / 2) * 9 / 16))  # the scene's pictures have 16 to 9
-frustum = hermesh.Frustum(position=eye, look_at=centre, up=(0.0, 0.0, 1.0), angle=angle, aspect=16 / 9, near=extent,
-                          far=3 * extent)
-theirs = hermesh.extract(hermesh.read_vdb(settings.file), extractor="manifold-dual-contouring", tolerance=0.1, frustum=frustum,
-                         outside="nothing")
+# the aspect ratio of the scene's pictures is 16:9
+angle = np.degrees(2 * np.arctan(np.tan(camera.data.angle_x / 2) * 9 / 16))
+frustum = hermesh.Frustum(position=eye, look_at=centre, up=(0.0, 0.0, 1.0), angle=angle, aspect=16 / 9,
+                          near=extent, far=3 * extent)
+theirs = hermesh.extract(hermesh.read_vdb(settings.file), extractor="manifold-dual-contouring", tolerance=0.1,
+                         frustum=frustum, outside="nothing")
 assert abs(len(ours.points) / len(theirs.points) - 1) < 0.02, (len(ours.points), len(theirs.points))
 settings.mask = "none"
 bpy.data.objects.remove(camera)
@@ -219,7 +222,8 @@ polygons_after = len(model.data.polygons)
 # Judge: all is well.
 is_done(bpy.ops.hermesh.judge())
 settings = bpy.context.scene.hermesh
-assert "watertight" in settings.verdict and settings.is_well and not settings.defects and settings.judged == model
+assert ("watertight" in settings.verdict and settings.is_well and not settings.defects
+        and settings.judged == model)
 assert not any(polygon.select for polygon in bpy.context.active_object.data.polygons)
 
 # Boolean: one half is cut off; without another object there is an error.
@@ -248,7 +252,8 @@ assert "surface" in pieces[0].data.attributes
 bpy.ops.ed.undo_push(message="broken")
 
 # An object cuts another into the parts inside and outside of it; it does not cut itself.
-bpy.ops.mesh.primitive_cube_add(size=extent, location=centre - [extent / 2, 0.0, 0.0] + [0.1 * extent, 0.0, extent / 2])
+bpy.ops.mesh.primitive_cube_add(size=extent,
+                                location=centre - [extent / 2, 0.0, 0.0] + [0.1 * extent, 0.0, extent / 2])
 cutter = bpy.context.active_object
 activate(pieces[0])
 settings = bpy.context.scene.hermesh
@@ -268,7 +273,8 @@ is_done(bpy.ops.hermesh.judge())
 settings = bpy.context.scene.hermesh
 assert any(polygon.select for polygon in bpy.context.active_object.data.polygons)
 assert "open" in settings.verdict or "boundary" in settings.verdict
-assert not settings.is_well and [(defect.name, defect.count) for defect in settings.defects] == [("boundary edges", 3)]
+assert (not settings.is_well
+        and [(defect.name, defect.count) for defect in settings.defects] == [("boundary edges", 3)])
 is_done(bpy.ops.hermesh.show_defect(index=0))
 assert bpy.context.mode == "EDIT_MESH" and bpy.context.active_object.name == settings.judged.name
 bpy.ops.object.mode_set(mode="OBJECT")

@@ -1,8 +1,8 @@
-"""A session in a real Blender in a window, with keys: xvfb-run -a -s "-screen 0 1280x1024x24" blender --factory-startup
--p 0 0 800 600 --python window_test.py [-- PRESSES]
+"""A session in a real Blender in a window, with keys: xvfb-run -a -s "-screen 0 1280x1024x24" blender
+--factory-startup -p 0 0 800 600 --python window_test.py [-- PRESSES]
 
-Prints how long after the key Escape work ends, from before the program that sends the key is begun. Any assertion that fails ends
-Blender with 1.
+Prints the delay from the key Escape to the end of the work, measured from the start of the program that sends
+the key. A failed assertion ends Blender with 1.
 """
 
 import pathlib
@@ -52,7 +52,8 @@ def stamp_what_is_heard():
 
 
 def press_escape(work, delay):
-    """In a thread of its own: a step would come right after a drawing and right before the next one, at no moment between."""
+    """Runs in its own thread: a step would run right after a redraw and right before the next one, at no
+    moment in between."""
     time.sleep(delay)
     stamps.update(pressed=time.monotonic(), stage=work.said[0], alive=work.thread.is_alive())
     in_window.xdotool("key", "Escape")
@@ -63,8 +64,8 @@ def steps():
     in_window.clear()
     area, _ = in_window.view()
     area.spaces.active.show_region_ui = True
-    # Blender draws a view several times one after another to smooth its edges, and hears no keys meanwhile: milliseconds on a
-    # graphics card, seconds where the processor draws that works besides.
+    # Blender draws a view several times in a row to smooth its edges, and ignores keys meanwhile:
+    # milliseconds on a graphics card, seconds with software rendering on a busy processor.
     bpy.context.preferences.system.viewport_aa = "OFF"
     in_window.move_mouse(area.x + area.width // 3, area.y + area.height // 2)
     bpy.ops.mesh.primitive_cube_add(location=(3.0, 0.0, 0.0))
@@ -74,7 +75,8 @@ def steps():
     bpy.ops.ed.undo_push(message="made")
     yield 0.5
 
-    # Another object becomes the active one meanwhile: the ball is the one that is remeshed, and no second work begins.
+    # Another object becomes the active one meanwhile: the ball is the one that is remeshed, and no second
+    # work begins.
     before = len(bpy.data.objects["ball"].data.polygons)
     settings = bpy.context.scene.hermesh
     settings.resolution = 150
@@ -97,7 +99,8 @@ def steps():
         work = invoke(bpy.ops.hermesh.remesh)
         bpy.data.objects["ball"].name = "renamed"
     yield from until_it_ends(work)
-    assert hermesh_blender.said.errors == ["the object ball is not there any more"], hermesh_blender.said.errors
+    assert hermesh_blender.said.errors == [
+        "the object ball is not there any more"], hermesh_blender.said.errors
     bpy.data.objects["renamed"].name = "ball"
 
     # Escape, at many moments of the work.
@@ -116,11 +119,13 @@ def steps():
         assert stamps["alive"] and hermesh_blender.said.notes[-1] == "cancelled" and work.ended is not None
         for times, moment in ((heard, stamps["heard"]), (ended, work.ended), (returned, stamps["returned"])):
             times.append(1000 * (moment - stamps["pressed"]))
-        print(f"Escape in '{stamps['stage']}': heard after {heard[-1]:.0f} ms, ended after {ended[-1]:.0f} ms, returned after "
+        print(f"Escape in '{stamps['stage']}': heard after {heard[-1]:.0f} ms, ended after {ended[-1]:.0f} "
+              f"ms, returned after "
               f"{returned[-1]:.0f} ms")
         yield 0.3
     for name, times in (("heard", heard), ("ended", ended), ("returned", returned)):
-        print(f"Escape to {name}: median {statistics.median(times):.0f} ms, at most {max(times):.0f} ms, {presses} presses")
+        print(f"Escape to {name}: median {statistics.median(times):.0f} ms, at most {max(times):.0f} ms, "
+              f"{presses} presses")
     assert len(bpy.data.objects["ball"].data.polygons) == before
     # The goal is 200 ms; machines that do other work besides get some more.
     assert statistics.median(ended) < 400, ended

@@ -1,9 +1,9 @@
 #!/usr/bin/env python3
 """Packs the built package as a wheel: the target hermesh_wheel calls it. Standard library alone.
 
-The wheel holds the package and hermesh's own libraries beside it, which it finds there. Those of the distribution (OpenVDB, TBB,
-OpenMesh, ...) it finds on the machine, so that it is for the release of Debian that it was built on. The same files make the same
-bytes.
+The wheel contains the package and, next to it, hermesh's own libraries. The distribution's libraries
+(OpenVDB, TBB, OpenMesh, ...) must be installed, so a wheel is for the release of Debian that it was built on.
+The same files give the same bytes.
 """
 
 import argparse
@@ -33,8 +33,10 @@ if sys.argv[1:2] == ["--print-name"]:
 parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
 parser.add_argument("--version", required=True)
 parser.add_argument("--package", required=True, type=pathlib.Path, help="folder of the built package")
-parser.add_argument("--library", required=True, action="append", type=pathlib.Path, help="shared library that comes along")
-parser.add_argument("--soname", required=True, action="append", help="what each is called by those that need it")
+parser.add_argument("--library", required=True, action="append", type=pathlib.Path,
+                    help="shared library that comes along")
+parser.add_argument("--soname", required=True, action="append",
+                    help="what each is called by those that need it")
 parser.add_argument("--licence", required=True, type=pathlib.Path)
 parser.add_argument("--cmake", required=True)
 parser.add_argument("--out", required=True, type=pathlib.Path, help="the wheel")
@@ -52,7 +54,8 @@ License: {licence}
 Requires-Python: >=3.9
 Requires-Dist: numpy
 """.encode(),
-    f"{info}/WHEEL": f"Wheel-Version: 1.0\nGenerator: hermesh make_wheel\nRoot-Is-Purelib: false\nTag: {tag}\n".encode(),
+    f"{info}/WHEEL": f"Wheel-Version: 1.0\nGenerator: hermesh make_wheel\nRoot-Is-Purelib: false\nTag: "
+                     f"{tag}\n".encode(),
     f"{info}/LICENSE": arguments.licence.read_bytes(),
 }
 

@@ -28,7 +28,8 @@ doctored = "UPDATE race SET seconds = 1"
 def extraction_row(label, seconds, distance, **changes):
     """Returns a row with distances in world units, where a voxel is half a unit."""
     return {"experiment": "race", "tier": "quick", "run": "first", "commit": COMMIT, "dirty": False,
-            "case": {"name": "ball", "origin": "data folder", "sha256": "abc"}, "resolution": 40, "voxel_size": 0.5,
+            "case": {"name": "ball", "origin": "data folder", "sha256": "abc"}, "resolution": 40,
+            "voxel_size": 0.5,
             "columns": ["seconds", "to_max"], "variant": {"name": "toy", "label": label, "options": "size=1"},
             "report": {"to_reference": {"max": distance}}, "broken": ["one", "two"],
             "seconds": {"median": seconds}, **changes}
@@ -37,8 +38,10 @@ def extraction_row(label, seconds, distance, **changes):
 def measured_row(label, **values):
     columns = [{"name": name, "header": name, "meaning": "m"} for name in values]
     return {"experiment": "count", "tier": "quick", "run": "first", "commit": COMMIT, "dirty": False,
-            "measurement": {"name": "count"}, "case": {"name": "thesis"}, "variant": {"name": label, "label": label},
-            "table": {"title": "t", "first_column": "threshold", "columns": columns}, "threads": 2, "values": values}
+            "measurement": {"name": "count"}, "case": {"name": "thesis"},
+            "variant": {"name": label, "label": label},
+            "table": {"title": "t", "first_column": "threshold", "columns": columns}, "threads": 2,
+            "values": values}
 
 
 def claim_text(rule, name="one", kind="measured"):
@@ -100,7 +103,8 @@ class Verdicts(Checkout):
         self.assertEqual(self.judged(wrong + 'why = ["One.", "Two."]').verdict, "contradicted")
         self.assertEqual(self.judged('untestable = "no host"', kind="untestable").verdict, "untestable")
         named = RULE.replace("printed = 4", "printed = { low = 4, high = 5 }")
-        named = named.replace("abs(reduction / printed - 1) < 0.01", "reduction BETWEEN printed_low AND printed_high")
+        named = named.replace("abs(reduction / printed - 1) < 0.01",
+                              "reduction BETWEEN printed_low AND printed_high")
         self.assertEqual(self.judged(named).verdict, "reproduced")
 
     def test_missing_rows(self):
@@ -108,7 +112,8 @@ class Verdicts(Checkout):
                              (RULE.replace("count b", "nowhere b"), "nowhere"),
                              (RULE.replace("a.points * 1.0 / b.points", "nullif(1, 1)"), "reduction: count"),
                              ('tests = ["Suite.Passes", "Suite.Fails"]', "Suite.Fails"),
-                             ('tests = "Suite.Never"', "Suite.Never"), (RULE + 'tests = "Suite.Fails"', "Suite.Fails")):
+                             ('tests = "Suite.Never"', "Suite.Never"),
+                             (RULE + 'tests = "Suite.Fails"', "Suite.Fails")):
             judged = self.judged(rule)
             self.assertEqual(judged.verdict, "missing")
             self.assertIn(reason, judged.reason)
@@ -152,7 +157,8 @@ class Doctor(Checkout):
         rows.add_directories(ROOT / "results")
         all_claims = claims.read_claims(ROOT / "paper/claims.toml")
         self.assertGreaterEqual(len(all_claims), 130)
-        self.assertEqual([wrong for claim in all_claims for wrong in claims.rules_that_cannot_fail(claim, rows)], [])
+        self.assertEqual([wrong for claim in all_claims
+                          for wrong in claims.rules_that_cannot_fail(claim, rows)], [])
 
 
 class File(Checkout):
@@ -164,7 +170,8 @@ class File(Checkout):
                            (claim_text('tests = "A.B"\nuntestable = "No."', kind="untestable"), "untestable"),
                            (claim_text('ours = "SELECT 1 AS a"\nreproduced = "a = 1"'), "doctored"),
                            (claim_text('ours = "SELECT 1 AS a"\ndoctored = "x"'), "condition"),
-                           (claim_text(RULE) * 2, "two claims one"), ("[[claim]]\nid = \"one\"", "one.*place"),
+                           (claim_text(RULE) * 2, "two claims one"),
+                           ("[[claim]]\nid = \"one\"", "one.*place"),
                            ("", "claim"), ("claim = [1]", "claim"), ("[[claim", "claims.toml")):
             self.write("paper/claims.toml", text)
             with self.assertRaisesRegex(LabError, word, msg=text):
@@ -199,10 +206,12 @@ class Command(Checkout):
         code, text = self.run_claims(both)
         self.assertEqual(code, 0)
         self.assertIn("| one | table 1 | It says. | 4 | 4.17 | shape reproduced |", text)
-        self.assertTrue(text.endswith("\n2 claims: 1 reproduced, 1 shape reproduced, 0 contradicted, 0 untestable, "
+        self.assertTrue(text.endswith("\n2 claims: 1 reproduced, 1 shape reproduced, 0 contradicted, 0 "
+                                      "untestable, "
                                       "0 missing.\n"))
         code, text = self.run_claims(both, "--format", "json", "--id", "tw")
-        self.assertEqual([(each["id"], each["verdict"]) for each in json.loads(text)], [("two", "reproduced")])
+        self.assertEqual([(each["id"], each["verdict"]) for each in json.loads(text)],
+                         [("two", "reproduced")])
         self.assertEqual(self.run_claims(both, "--doctor"), (0, ""))
         cannot_fail = claim_text(RULE.replace("points = 100 WHERE", "points = 241 WHERE"))
         self.assertEqual(self.run_claims(cannot_fail, "--doctor")[0], 3)

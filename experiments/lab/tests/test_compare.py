@@ -329,7 +329,8 @@ class Cells(unittest.TestCase):
 
     def test_a_renamed_cell_is_compared(self):
         def states(changes):
-            comparison = compared_with(put(SHARP, {"/variant/label": "pointed"} | changes), allow_missing=True)
+            comparison = compared_with(put(SHARP, {"/variant/label": "pointed"} | changes),
+                                       allow_missing=True)
             return [number(comparison, state) for state in ("renamed", "missing", "new", "regressions")]
         self.assertEqual(states({"/report/points": 1}), [1, 0, 0, 1])
         self.assertEqual(states({"/digest": "other"}), [1, 0, 0, 1])
@@ -350,12 +351,14 @@ class Cells(unittest.TestCase):
 
     def test_pooled_runs(self):
         def runs(*all_seconds):
-            return [mesh_row("smooth", "a=1", 1) | {"run": f"run {run}", "seconds": {"median": 1, "all": seconds}}
+            return [mesh_row("smooth", "a=1", 1) |
+                    {"run": f"run {run}", "seconds": {"median": 1, "all": seconds}}
                     for run, seconds in enumerate(all_seconds)]
 
         def about(*medians):
             return runs(*(seconds_about(median, seed)["all"] for seed, median in enumerate(medians)))
-        few, slower_few = ([row | {"seconds": row["seconds"] | {"all": row["seconds"]["all"][:2]}} for row in rows]
+        few, slower_few = ([row | {"seconds": row["seconds"] | {"all": row["seconds"]["all"][:2]}}
+                            for row in rows]
                            for rows in (about(1.0, 1.0, 1.0), about(1.3, 1.3, 1.3)))
         self.assertTrue(compare_rows(few, slower_few).fine(), "two repetitions are too few")
         unpooled = copy.deepcopy(few)
@@ -449,13 +452,15 @@ class Command(unittest.TestCase):
 
     def test_exit_codes(self):
         with tempfile.TemporaryDirectory() as directory:
-            same, worse, fewer = (pathlib.Path(directory) / name for name in ("a.jsonl", "b.jsonl", "c.jsonl"))
+            same, worse, fewer = (pathlib.Path(directory) / name
+                                  for name in ("a.jsonl", "b.jsonl", "c.jsonl"))
             append_rows(same, baseline())
             DRIFTS["a measured error larger by 3 %"](rows := baseline())
             append_rows(worse, rows)
             append_rows(fewer, baseline()[1:])
             for code, *arguments in (
-                    (0, same, same), (3, same, worse), (0, worse, same), (0, same, worse, "--tolerance", "4%"),
+                    (0, same, same), (3, same, worse), (0, worse, same),
+                    (0, same, worse, "--tolerance", "4%"),
                     (3, same, worse, "--tolerance", "0.02"), (3, same, fewer),
                     (0, same, fewer, "--allow-missing"), (0, fewer, same)):
                 self.assertEqual(self.run_command(*arguments)[0], code, arguments)

@@ -125,9 +125,11 @@ class Files(Reads):
             ("= false", "= 1", "self_intersections"), ("samples", "components", '"components"'),
             ('"ball"', '"bell"', "quick.cases[0].name"),
             ("10, 20", "10, 1", "resolutions[1]"), (ball, '{ name = "ball" }', "resolutions"),
-            ("0.2, ", "", "closeup"), ("0.3", "1.5", "closeup[2]"), ("view = [9", 'view = ["left"', "view[0]")])
+            ("0.2, ", "", "closeup"), ("0.3", "1.5", "closeup[2]"),
+            ("view = [9", 'view = ["left"', "view[0]")])
         self.assert_mistakes(VOXELIZATION, [
-            ('"plain, fast"', '"plain"', "voxelizers[1]"), ('case = "ball"', 'case = "bell"', "plots[0].case"),
+            ('"plain, fast"', '"plain"', "voxelizers[1]"),
+            ('case = "ball"', 'case = "bell"', "plots[0].case"),
             ("swept", "sweep", "plots[0].x"), ("[10]", "[9], view = [1, 2]", '"view"'),
             ("[10]", "[9], voxel_sizes = [1]", "either"), ('"all"', '"some"', "distances"),
             ('"parity"', '"guess"', "signs"), ("[10]", "[9], length = 3", "length"),

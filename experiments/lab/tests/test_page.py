@@ -22,7 +22,8 @@ HOSTILE = "</script><img src=x onerror=alert(1)><!-- \u2028 & \" ' {{ 1 }} {% ra
 
 def row_of(run="1", label="a", triangles=100, rms=0.25, seconds=(0.3, 0.1, 0.2), **changes):
     """Returns a row with voxel size 0.5 and distances in world units."""
-    return {"experiment": "toy", "tier": "quick", "question": "why?", "run": run, "commit": "0123456789abcdef",
+    return {"experiment": "toy", "tier": "quick", "question": "why?", "run": run,
+            "commit": "0123456789abcdef",
             "date": f"2026-01-0{run}T00:00:00Z", "columns": ["triangles", "seconds", "to_rms"],
             "case": {"name": "ball", "origin": "generated", "sha256": "abcdef"},
             "resolution": 40, "voxel_size": 0.5,
@@ -64,7 +65,8 @@ class Page(unittest.TestCase):
             text = re.search(element, html, re.DOTALL)[1]
             digest = base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()
             self.assertIn(f"{kind}-src 'sha256-{digest}'", policy)
-        self.assertNotRegex(html, r" src=|@import|url\(|fetch\(|XMLHttpRequest|innerHTML|AdjacentHTML|document.write")
+        self.assertNotRegex(html,
+                            r" src=|@import|url\(|fetch\(|XMLHttpRequest|innerHTML|AdjacentHTML|document.write")
 
     def test_colours_are_those_of_the_plots(self):
         colours = tuple(re.findall(r"--c\d: (#\w+);", page._part("page.css")))
@@ -111,7 +113,8 @@ class Figures(unittest.TestCase):
         self.assertEqual(points_of(figure), {"a": [[1, 1000, 0.2, 0.1, 0.3], [0, 4000, 2, None, None]]})
 
     def test_plots_of_the_rows_replace_those_of_their_kind(self):
-        plot = {"name": "p", "title": "asked", "x": "triangles", "y": ["to_rms"], "x_label": "", "y_label": ""}
+        plot = {"name": "p", "title": "asked", "x": "triangles", "y": ["to_rms"], "x_label": "",
+                "y_label": ""}
         rows = [row_of(label="b", triangles=50), row_of(plots=[plot])]
         figure, = titled(rows, "asked")
         self.assertEqual(points_of(figure)["a"], [[1, 100, 0.5, None, None]])
@@ -221,7 +224,8 @@ class Meshes(unittest.TestCase):
                 self.square(f"toy-{case}-40/{number}-{label}.ply")
         self.square("toy-x-40/10-c.ply")
         groups = page._mesh_files(self.directory, rows)
-        self.assertEqual([[row for _, row in group] for group in groups], [[0, 1, 2], [3, 4, 5], [6, 7, 8, 8]])
+        self.assertEqual([[row for _, row in group] for group in groups],
+                         [[0, 1, 2], [3, 4, 5], [6, 7, 8, 8]])
         self.assertEqual([file.name for file, _ in groups[2]], ["1-a.ply", "2-b.ply", "3-c.ply", "10-c.ply"])
         for count, expected in ((0, []), (2, [0, 1]), (5, [0, 1, 2]), (7, [0, 1, 2, 3, 4, 5]),
                                 (10, [0, 1, 2, 3, 4, 5, 6, 7, 8, 8])):

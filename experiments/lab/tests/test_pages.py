@@ -24,7 +24,8 @@ class PagesCase(Checkout):
     def setUp(self):
         super().setUp()
         self.write("paper/numbers.toml", NUMBERS)
-        self.write("experiments/cases.toml", '[[case]]\nname = "ball"\nfiles = [{ file = "x", sha256 = "abc" }]\n')
+        self.write("experiments/cases.toml",
+                   '[[case]]\nname = "ball"\nfiles = [{ file = "x", sha256 = "abc" }]\n')
         self.write("page.md", "")
 
     def filled(self, text):
@@ -45,7 +46,8 @@ class Filling(PagesCase):
         page = "It is <!--=speed-->?<!--/--> times as fast on Debian 12, see table 9.2 of 2011, no 7.\n"
         self.write("page.md", page)
         self.assertEqual(len(self.problems()), 1 + 3 + 1)  # a number, three tables, the hashes
-        self.assertEqual(set(pages.fill(self.root)), {"page.md", "results/SHA256SUMS", "results/race/table.md",
+        self.assertEqual(set(pages.fill(self.root)),
+                         {"page.md", "results/SHA256SUMS", "results/race/table.md",
                                                       "results/count/table.md", "results/tests/table.md"})
         self.assertEqual(self.read("page.md"), page.replace("?", "4"))
         self.assertEqual(self.problems(), [])
@@ -58,7 +60,8 @@ class Filling(PagesCase):
                 ("range", "240.0 to 1000.0"), ("alike", "4"), ("count", "1"), ("count shape reproduced", "1"),
                 ("count reproduced", "0"), ("ablations", "\nNo ablation has rows yet.\n"),
                 ("all", "\n| which | time [s] |\n| --- | --: |\n| slow | 2 |\n| fast | 0.5 |\n")):
-            self.assertEqual(self.filled(f"a <!--={marker}--><!--/--> b"), f"a <!--={marker}-->{content}<!--/--> b")
+            self.assertEqual(self.filled(f"a <!--={marker}--><!--/--> b"),
+                             f"a <!--={marker}-->{content}<!--/--> b")
         table = self.filled("<!--=table race ball 40--><!--/-->")
         self.assertIn("| slow    |        2 |         0.5 |\n", table)
         self.assertIn("**ball at resolution 40**", table)
@@ -69,8 +72,10 @@ class Filling(PagesCase):
     def test_wrong_markers_are_named(self):
         for text, words in (("<!--=speed-->4\n", "page.md:1: .*no end"),
                             ("<!--=speed-->4 <!--=all--><!--/-->", "page.md:1: "),
-                            ("\n<!--=sped-->4<!--/-->\n", "page.md:2: .*sped"), ("<!--=nobody--><!--/-->", "no row"),
-                            ("<!--=lacking--><!--/-->", "max"), ("<!--=table race cube--><!--/-->", "no such table"),
+                            ("\n<!--=sped-->4<!--/-->\n", "page.md:2: .*sped"),
+                            ("<!--=nobody--><!--/-->", "no row"),
+                            ("<!--=lacking--><!--/-->", "max"),
+                            ("<!--=table race cube--><!--/-->", "no such table"),
                             ("<!--=legend absent--><!--/-->", "absent")):
             with self.assertRaisesRegex(LabError, words, msg=text):
                 self.filled(text)
@@ -78,7 +83,8 @@ class Filling(PagesCase):
     def test_mistakes_in_the_file_of_numbers_are_named(self):
         for text, word in (("[numbers]\nx = { query = \"SELECT 1\", format = \"%s\" }", "x: .*format"),
                            ("[numbers]\nx = { query = \"SELECT 1\", format = \"%f %f\" }", "x: .*format"),
-                           ("[numbers]\nx = { form = \"%f\" }", "x: "), ("[number]", "number"), ("pages = 1", "pages"),
+                           ("[numbers]\nx = { form = \"%f\" }", "x: "), ("[number]", "number"),
+                           ("pages = 1", "pages"),
                            ("[tables]\nx = 1", "x "), ("[plain]\nall = 'x'", "all "),
                            ("pages = [\"absent.md\"]", "absent.md"), ("pages =", "numbers.toml")):
             self.write("paper/numbers.toml", text)
@@ -115,7 +121,8 @@ class Checking(PagesCase):
         self.assert_one_problem("results/race: the input ball has the SHA-256 abc")
         made = {"name": "ball", "origin": "generated", "sha256": "abc"}
         self.put("race", extraction_row("slow", 2.0, 0.25, case=made),
-                 extraction_row("fast", 0.5, 0.5, inputs=[{"name": "cube", "origin": "data folder", "sha256": "123"}]))
+                 extraction_row("fast", 0.5, 0.5,
+                                inputs=[{"name": "cube", "origin": "data folder", "sha256": "123"}]))
         pages.fill(self.root)
         self.assertEqual(len(self.problems()), 2)
 
@@ -136,7 +143,8 @@ class Orphans(unittest.TestCase):
     def test_numbers_without_a_marker(self):
         for text, expected in (
                 ("It is 14.5 times\nas fast as 1,000 others.", [(1, "14.5"), (2, "1,000")]),
-                ("`-o tolerance=0.1`, [x](page-2.md), <!--=a-->5.1 to 7<!--/-->, x86-64, C++20, Debian 12", []),
+                ("`-o tolerance=0.1`, [x](page-2.md), <!--=a-->5.1 to 7<!--/-->, x86-64, C++20, Debian 12",
+                 []),
                 ("tables 9.1 to 9.4, (figures 9.15 and 9.16), §5.2, Chapter 6, in 2011", []),
                 ("table 9.2 has 12 rows", [(1, "12")]), ("```\n12\n```\n13", [(4, "13")]),
                 ("<!-- 4 --> -5 m-6", [(1, "5")]), ("on Debian\n12 and 13", [(2, "13")])):

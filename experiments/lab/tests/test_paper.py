@@ -99,7 +99,8 @@ class Refusals(Case):
         self.change_rows(lambda row: row["values"].update(differing=0), "stale")
         self.seal()
         Paper(self.root).write(self.out)
-        self.change_rows(lambda row: row["values"].update(differing=1, difference="points was 1, now 2"), "stale")
+        self.change_rows(lambda row: row["values"].update(differing=1, difference="points was 1, now 2"),
+                         "stale")
         self.seal()
         self.refused("dragon", "headline is stale", "points was 1, now 2")
 
@@ -107,7 +108,8 @@ class Refusals(Case):
         for text, *words in (("\\N{nobody}", "one.tex:1", "nobody", "no row"),
                              ("\\N{lacking}", "one.tex:1", "lacking", "most"),
                              ("\\N{constant}", "constant", "no directory of results/"),
-                             ("A\n\\N{unheard}", "one.tex:2", "unheard"), ("\n\\T{unheard}", "one.tex:2", "unheard"),
+                             ("A\n\\N{unheard}", "one.tex:2", "unheard"),
+                             ("\n\\T{unheard}", "one.tex:2", "unheard"),
                              ("\\T{none}", "the table none", "no row"),
                              ("It takes 4.32 s.", "one.tex:1", "4.32"), ("\\N{count_maybe}", "count_maybe"),
                              ("\\N{ablations}", "no directory")):
@@ -163,7 +165,8 @@ class Text(unittest.TestCase):
     def test_the_log_is_read(self):
         self.assertEqual(paper.problems_of_log("Overfull \\hbox (0.9pt too wide) in paragraph"), [])
         self.assertEqual(len(paper.problems_of_log("Overfull \\hbox (1.1pt too wide) in paragraph")), 1)
-        self.assertEqual(len(paper.problems_of_log("LaTeX Warning: Citation `x' on page 1 undefined on line 3.")), 1)
+        self.assertEqual(len(paper.problems_of_log("LaTeX Warning: Citation `x' on page 1 undefined on line "
+                                                   "3.")), 1)
         self.assertEqual(paper.problems_of_log("", "Warning--empty year in x\n"), ["empty year in x"])
 
 

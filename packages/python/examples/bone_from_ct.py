@@ -11,9 +11,11 @@ import hermesh
 
 path = shapes.model("cranium_ct_256x256x108_int16le.raw.gz")
 if path:
-    scan = hermesh.import_volume(path, dims=(256, 256, 108), type="int16", spacing=(0.9570312, 0.9570312, 1.5))
+    scan = hermesh.import_volume(path, dims=(256, 256, 108), type="int16",
+                                 spacing=(0.9570312, 0.9570312, 1.5))
 else:
-    # A head of soft tissue (40 HU) with a skull (1200 HU) of 6 mm around a brain, in air (-1000 HU), as scanners write it.
+    # A head of soft tissue (40 HU) with a skull (1200 HU) of 6 mm around a brain, in air (-1000 HU), as
+    # scanners write it.
     spacing = (2.0, 2.0, 2.5)
     z, y, x = np.meshgrid(*(np.arange(n) for n in (80, 110, 100)), indexing="ij")
     radius = np.sqrt(((x - 50) * 2.0 / 80)**2 + ((y - 55) * 2.0 / 95)**2 + ((z - 40) * 2.5 / 85)**2)
@@ -29,9 +31,11 @@ print(f"scan: {' x '.join(map(str, scan.dims))} samples, {low:.0f} to {high:.0f}
 
 # Samples above the isovalue are inside; where the bone reaches the end of the scan it gets a flat cap.
 log = hermesh.Log()
-bone = hermesh.extract(scan, isovalue=300, extractor="manifold-dual-contouring", tolerance=0.1, written_in_single=True, log=log)
+bone = hermesh.extract(scan, isovalue=300, extractor="manifold-dual-contouring", tolerance=0.1,
+                       written_in_single=True, log=log)
 report = hermesh.validate(bone)
-print(f"bone: {len(bone.triangulated())} triangles, {report.components} surfaces, {report.volume / 1000:.1f} cm³")
+print(f"bone: {len(bone.triangulated())} triangles, {report.components} surfaces, {report.volume / 1000:.1f} "
+      f"cm³")
 print(f"watertight: {report.watertight}")
 for note in log.notes:
     print("note:", note)

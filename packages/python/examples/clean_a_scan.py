@@ -20,13 +20,15 @@ else:
     scan = hermesh.Mesh(points, triangles)
 
 before = hermesh.validate(scan)
-print(f"scan:  {before.triangles} triangles, {before.boundary_edges} open edges, {before.inconsistent_edges} turned-over edges")
+print(f"scan:  {before.triangles} triangles, {before.boundary_edges} open edges, {before.inconsistent_edges} "
+      f"turned-over edges")
 
 # Winding numbers find the inside of meshes with holes; the mesh stays within 0.2 voxels of the uniform one.
 log = hermesh.Log()
 clean = hermesh.remesh(scan, resolution=120, signs="winding-number", tolerance=0.2, log=log)
 after = hermesh.validate(clean, reference=scan)
-print(f"clean: {after.triangles} triangles, watertight: {after.watertight}, genus {after.genus:.0f}, volume {after.volume:.4g}")
+print(f"clean: {after.triangles} triangles, watertight: {after.watertight}, genus {after.genus:.0f}, volume "
+      f"{after.volume:.4g}")
 print(f"distance to the scan: rms {after.to_reference.rms:.2g}, at most {after.to_reference.max:.2g}")
 for note in log.notes:
     print("note:", note)

@@ -23,7 +23,8 @@ for name, mesh in meshes.items():
     to, back = report.certified_to_reference, report.certified_from_reference
     voxel = size / 100
     print(f"{name:26} {len(mesh.triangulated()):9}  {to.lower / voxel:.3f} to {to.upper / voxel:.3f}"
-          f"         {back.lower / voxel:.3f} to {back.upper / voxel:.3f}           {str(report.watertight):10}  {report.solid}")
+          f"         {back.lower / voxel:.3f} to {back.upper / voxel:.3f}           "
+          f"{str(report.watertight):10}  {report.solid}")
 
 # Without models it prints
 #   mesh                       triangles  to the part [voxels]  from the part [voxels]  watertight  solid

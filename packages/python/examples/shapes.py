@@ -14,7 +14,8 @@ def model(name):
 
 def torus(large=1.0, small=0.4, around=96, across=48):
     """Points (n, 3) and triangles (m, 3) of a torus about the z axis."""
-    u, v = np.meshgrid(2 * np.pi * np.arange(around) / around, 2 * np.pi * np.arange(across) / across, indexing="ij")
+    u, v = np.meshgrid(2 * np.pi * np.arange(around) / around, 2 * np.pi * np.arange(across) / across,
+                       indexing="ij")
     radius = large + small * np.cos(v)
     points = np.stack([radius * np.cos(u), radius * np.sin(u), small * np.sin(v)], axis=-1).reshape(-1, 3)
     i, j = np.meshgrid(np.arange(around), np.arange(across), indexing="ij")
@@ -27,4 +28,5 @@ def box(lower, upper):
     """Points (8, 3) and quads (6, 4) of an axis-aligned box."""
     corners = np.array([[i & 1, i >> 1 & 1, i >> 2 & 1] for i in range(8)])
     points = np.where(corners, upper, lower).astype(np.float32)
-    return points, np.array([[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]])
+    return points, np.array([[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2],
+                             [1, 3, 7, 5]])

@@ -19,12 +19,16 @@ class Cancelled(Exception):
 class Mesh:
 
     def __init__(self, points: ArrayLike, triangles: ArrayLike | None = ..., quads: ArrayLike | None = ..., *,
-                 point_attributes: Mapping[str, ArrayLike] = ..., corner_attributes: Mapping[str, ArrayLike] = ...,
-                 polygon_attributes: Mapping[str, ArrayLike] = ..., labels: Mapping[str, Sequence[str]] = ...) -> None:
+                 point_attributes: Mapping[str, ArrayLike] = ...,
+                 corner_attributes: Mapping[str, ArrayLike] = ...,
+                 polygon_attributes: Mapping[str, ArrayLike] = ...,
+                 labels: Mapping[str, Sequence[str]] = ...) -> None:
         ...
 
-    def with_attributes(self, *, point_attributes: Mapping[str, ArrayLike] = ..., corner_attributes: Mapping[str, ArrayLike] = ...,
-                        polygon_attributes: Mapping[str, ArrayLike] = ..., labels: Mapping[str, Sequence[str]] = ...) -> Mesh:
+    def with_attributes(self, *, point_attributes: Mapping[str, ArrayLike] = ...,
+                        corner_attributes: Mapping[str, ArrayLike] = ...,
+                        polygon_attributes: Mapping[str, ArrayLike] = ...,
+                        labels: Mapping[str, Sequence[str]] = ...) -> Mesh:
         ...
 
     @property
@@ -72,12 +76,13 @@ class Mesh:
 class Volume:
 
     @staticmethod
-    def from_numpy(values: ArrayLike, *, lower: Sequence[int] = ..., voxel_size: float = ..., origin: Sequence[float] = ...,
-                   placement: ArrayLike | None = ..., level_set: bool = ..., background: float | None = ...,
-                   name: str = ...) -> Volume:
+    def from_numpy(values: ArrayLike, *, lower: Sequence[int] = ..., voxel_size: float = ...,
+                   origin: Sequence[float] = ..., placement: ArrayLike | None = ..., level_set: bool = ...,
+                   background: float | None = ..., name: str = ...) -> Volume:
         ...
 
-    def to_numpy(self, lower: Sequence[int] | None = ..., dims: Sequence[int] | None = ...) -> NDArray[np.float32]:
+    def to_numpy(self, lower: Sequence[int] | None = ...,
+                 dims: Sequence[int] | None = ...) -> NDArray[np.float32]:
         ...
 
     def sample(self, places: ArrayLike) -> NDArray[np.float32]:
@@ -139,7 +144,8 @@ class Watch:
     stage_seconds: list[tuple[str, float]]
     figures: list[tuple[str, float]]
 
-    def __init__(self, progress: Callable[[str, float], Any] | None, cancel: Any, threads: int | None) -> None:
+    def __init__(self, progress: Callable[[str, float], Any] | None, cancel: Any,
+                 threads: int | None) -> None:
         ...
 
 
@@ -152,8 +158,9 @@ class Frustum:
     near: float
     far: float
 
-    def __init__(self, *, position: Sequence[float] = ..., look_at: Sequence[float] = ..., up: Sequence[float] = ...,
-                 angle: float = ..., aspect: float = ..., near: float = ..., far: float = ...) -> None:
+    def __init__(self, *, position: Sequence[float] = ..., look_at: Sequence[float] = ...,
+                 up: Sequence[float] = ..., angle: float = ..., aspect: float = ..., near: float = ...,
+                 far: float = ...) -> None:
         ...
 
 
@@ -275,8 +282,9 @@ def write_vdb(path: str, volumes: Sequence[Volume], watch: Watch, /) -> None:
     ...
 
 
-def import_volume(path: str, frame: int | None, dims: Sequence[int] | None, type: str, spacing: Sequence[float] | None,
-                  offset: int | None, replace_nan: float | None, watch: Watch, /) -> Volume:
+def import_volume(path: str, frame: int | None, dims: Sequence[int] | None, type: str,
+                  spacing: Sequence[float] | None, offset: int | None, replace_nan: float | None,
+                  watch: Watch, /) -> Volume:
     ...
 
 
@@ -284,7 +292,8 @@ def voxelize(mesh: Mesh, options: VoxelizeOptions, watch: Watch, /) -> Volume:
     ...
 
 
-def voxelize_grids(mesh: Mesh, grids: str, options: VoxelizeOptions, fog_exterior: bool, watch: Watch, /) -> list[Volume]:
+def voxelize_grids(mesh: Mesh, grids: str, options: VoxelizeOptions, fog_exterior: bool, watch: Watch,
+                   /) -> list[Volume]:
     ...
 
 
@@ -296,12 +305,14 @@ def remesh(mesh: Mesh, voxelizing: VoxelizeOptions, extracting: ExtractOptions, 
     ...
 
 
-def remesh_within(mesh: Mesh, error: float | None, triangles: int | None, signs: str, over_holes: bool, smallest_voxel: float,
-                  limit_points: float, written_in_single: bool, watch: Watch, /) -> tuple[Mesh, float, float, float, float]:
+def remesh_within(mesh: Mesh, error: float | None, triangles: int | None, signs: str, over_holes: bool,
+                  smallest_voxel: float, limit_points: float, written_in_single: bool, watch: Watch,
+                  /) -> tuple[Mesh, float, float, float, float]:
     ...
 
 
-def combine(operation: str, a: Mesh, b: Mesh, voxelizing: VoxelizeOptions, extracting: ExtractOptions, watch: Watch, /) -> Mesh:
+def combine(operation: str, a: Mesh, b: Mesh, voxelizing: VoxelizeOptions, extracting: ExtractOptions,
+            watch: Watch, /) -> Mesh:
     ...
 
 

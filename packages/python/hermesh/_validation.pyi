@@ -77,8 +77,9 @@ class FractureReport:
     sentences: list[str]
 
 
-def validate(mesh: Mesh, reference: Mesh | None, features: Mesh | None, self_intersections: bool, libraries: bool, certify: bool,
-             samples: int, dihedral: float, voxel_size: float, watch: Watch, /) -> Report:
+def validate(mesh: Mesh, reference: Mesh | None, features: Mesh | None, self_intersections: bool,
+             libraries: bool, certify: bool, samples: int, dihedral: float, voxel_size: float, watch: Watch,
+             /) -> Report:
     ...
 
 

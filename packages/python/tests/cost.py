@@ -1,9 +1,11 @@
-"""What a call of the module costs beside the program, in time and in memory: cost.py MESH RESOLUTION [REPETITIONS]
+"""Compares the time and memory of a call of the module with the program: cost.py MESH RESOLUTION
+[REPETITIONS]
 
-Each is a process of its own, which reads the mesh, remeshes it and writes the result; they take turns. $HERMESH_PROGRAM is the
-program, $PYTHONPATH has the module. Prints the seconds of the work itself, those of the whole process and the peaks of resident
-memory; the arrays of both meshes together are what one copy of them would take. Load on the machine is seen in both alike. Exits
-with 1 if the results differ, or if beyond the starts, by medians, the module takes over 3 % more CPU or memory for over one copy.
+Each runs in its own process, which reads the mesh, remeshes it and writes the result; the runs are
+interleaved, so load on the machine affects both. $HERMESH_PROGRAM is the program, $PYTHONPATH has the module.
+Prints the seconds of the work itself, those of the whole process and the peaks of resident memory; one copy
+means the size of the arrays of both meshes. Exits with 1 if the results differ, or if, by medians and without
+the start-up, the module takes over 3 % more CPU time, or more memory than one additional copy.
 """
 
 import json
@@ -36,8 +38,8 @@ print(json.dumps({"call": seconds, "call_cpu": cpu, "array_bytes": size}))
 
 def run(command):
     """Seconds and peak of memory in MiB of a process, and what it prints."""
-    process = subprocess.Popen(["/usr/bin/env", "time", "-f", "%e %U %S %M", *command], stdout=subprocess.PIPE,
-                               stderr=subprocess.PIPE, text=True)
+    process = subprocess.Popen(["/usr/bin/env", "time", "-f", "%e %U %S %M", *command],
+                               stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     out, err = process.communicate()
     if process.returncode != 0:
         sys.exit(err)
@@ -48,7 +50,8 @@ def run(command):
 
 with tempfile.TemporaryDirectory() as folder:
     theirs, ours = os.path.join(folder, "program.ply"), os.path.join(folder, "module.ply")
-    program = [os.environ["HERMESH_PROGRAM"], "remesh", mesh, theirs, "--resolution", str(resolution), "--json"]
+    program = [os.environ["HERMESH_PROGRAM"], "remesh", mesh, theirs, "--resolution", str(resolution),
+               "--json"]
     module = [sys.executable, "-c", MODULE, mesh, str(resolution), ours]
     # The cost of either before any work.
     starts = {"program": [run([os.environ["HERMESH_PROGRAM"], "--version"]) for _ in range(3)],
@@ -61,23 +64,28 @@ with tempfile.TemporaryDirectory() as folder:
         same = a.read() == b.read()
         print("bytes:", "the same" if same else "DIFFERENT")
     for name, row in rows.items():
-        print(f"{name:8} elapsed {' '.join(f'{r[0]:.2f}' for r in row)} s, median {statistics.median(r[0] for r in row):.2f};"
-              f" CPU median {statistics.median(r[1] for r in row):.2f} s; peak {min(r[2] for r in row):.0f} to"
+        print(f"{name:8} elapsed {' '.join(f'{r[0]:.2f}' for r in row)} s, median "
+              f"{statistics.median(r[0] for r in row):.2f};"
+              f" CPU median {statistics.median(r[1] for r in row):.2f} s; peak {min(r[2] for r in row):.0f} "
+              f"to"
               f" {max(r[2] for r in row):.0f} MiB")
     over = {}
     for kind, of in (("least", min), ("median", statistics.median)):
-        beyond = {name: [of(r[i] for r in row) - of(r[i] for r in starts[name]) for i in range(3)] for name, row in rows.items()}
+        beyond = {name: [of(r[i] for r in row) - of(r[i] for r in starts[name]) for i in range(3)]
+                  for name, row in rows.items()}
         for name, (elapsed, cpu, peak) in beyond.items():
             begin = [of(r[i] for r in starts[name]) for i in range(3)]
             print(f"{kind:6} {name:8} start {begin[0]:.2f} s, {begin[1]:.2f} s of CPU, {begin[2]:.0f} MiB;"
                   f" beyond the start {elapsed:.2f} s, {cpu:.2f} s of CPU, {peak:.1f} MiB")
         ours, theirs = beyond["module"], beyond["program"]
         over[kind] = 100 * (ours[1] / theirs[1] - 1), ours[2] - theirs[2]
-        print(f"{kind:6} module over program, beyond the starts: elapsed {100 * (ours[0] / theirs[0] - 1):+.1f} %,"
+        print(f"{kind:6} module over program, beyond the starts: elapsed "
+              f"{100 * (ours[0] / theirs[0] - 1):+.1f} %,"
               f" CPU {over[kind][0]:+.1f} %, peak {over[kind][1]:+.1f} MiB")
     calls = [json.loads(row[3]) for row in rows["module"]]
     size = calls[0]["array_bytes"] / 2**20
-    print(f"the call alone, on arrays that are there: median {statistics.median(c['call'] for c in calls):.2f} s,"
+    print(f"the call alone, on arrays that are there: median "
+          f"{statistics.median(c['call'] for c in calls):.2f} s,"
           f" {statistics.median(c['call_cpu'] for c in calls):.2f} s of CPU")
     print(f"one copy of the arrays of both meshes: {size:.1f} MiB")
     more_cpu, more_memory = over["median"]

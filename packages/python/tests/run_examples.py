@@ -1,8 +1,10 @@
-"""Runs the examples, and the script of the README, in a fresh virtual environment in which the wheel is installed, and compares
-what they print with the comments at their ends: run_examples.py WHEEL [--write]. With --write it writes these comments; with
---installed in the wheel's place the environment sees the module of the distribution's package.
+"""Runs the examples, and the script of the README, in a fresh virtual environment in which the wheel is
+installed, and compares what they print with the comments at their ends: run_examples.py WHEEL [--write]. With
+--write it writes these comments; with --installed instead of a wheel the environment uses the module of the
+distribution's package.
 
-The models of $HERMESH_DATA are used where they are; without them each example has shapes of its own, and another comment.
+The models of $HERMESH_DATA are used if they exist; without them each example uses shapes of its own, and has
+another comment.
 """
 
 import os
@@ -34,7 +36,8 @@ with tempfile.TemporaryDirectory() as folder:
     # numpy is the distribution's.
     venv.create(folder, system_site_packages=True, with_pip=True)
     python = os.path.join(folder, "bin", "python")
-    environment = {key: value for key, value in os.environ.items() if key not in ("HERMESH_DATA", "PYTHONPATH")}
+    environment = {key: value for key, value in os.environ.items()
+                   if key not in ("HERMESH_DATA", "PYTHONPATH")}
     environment["PYTHONIOENCODING"] = "utf-8"
     places = [folder, os.path.realpath(folder)]
     if wheel == "--installed":
@@ -69,10 +72,12 @@ with tempfile.TemporaryDirectory() as folder:
             else:
                 print(f"{example.name}: as its comment says ({len(printed.splitlines())} lines)")
         if write:
-            example.write_text(code + "\n" + "\n".join(title + text for title, text in comments.items()), encoding="utf-8")
+            example.write_text(code + "\n" + "\n".join(title + text for title, text in comments.items()),
+                               encoding="utf-8")
 
     # The script of the README reads scan.ply where it is started.
-    script = re.search("```python\n(.*?)```", (ours / "README.md").read_text(encoding="utf-8"), re.DOTALL).group(1)
+    script = re.search("```python\n(.*?)```", (ours / "README.md").read_text(encoding="utf-8"),
+                       re.DOTALL).group(1)
     if len(script.splitlines()) > 10:
         sys.exit("the script of the README has more than ten lines")
     run([python, "-c", "import shapes, hermesh; hermesh.write_mesh('scan.ply', shapes.torus())"], cwd=folder,

@@ -5,7 +5,8 @@ import numpy as np
 
 def torus(large=1.0, small=0.4, around=48, across=24):
     """Points (n, 3) float32 and triangles (m, 3) uint32 of a torus about the z axis."""
-    u, v = np.meshgrid(2 * np.pi * np.arange(around) / around, 2 * np.pi * np.arange(across) / across, indexing="ij")
+    u, v = np.meshgrid(2 * np.pi * np.arange(around) / around, 2 * np.pi * np.arange(across) / across,
+                       indexing="ij")
     radius = large + small * np.cos(v)
     points = np.stack([radius * np.cos(u), radius * np.sin(u), small * np.sin(v)], axis=-1).reshape(-1, 3)
     i, j = np.meshgrid(np.arange(around), np.arange(across), indexing="ij")

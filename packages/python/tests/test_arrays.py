@@ -26,7 +26,8 @@ class Arrays(unittest.TestCase):
         np.testing.assert_array_equal(mesh.points, points)
         np.testing.assert_array_equal(mesh.triangles, triangles)
         np.testing.assert_array_equal(mesh.quads, quads)
-        self.assertEqual((mesh.points.dtype, mesh.triangles.dtype, mesh.quads.dtype), (np.float32, np.uint32, np.uint32))
+        self.assertEqual((mesh.points.dtype, mesh.triangles.dtype, mesh.quads.dtype),
+                         (np.float32, np.uint32, np.uint32))
         self.assertEqual(mesh.origin, (0, 0, 0))
 
     def test_are_views_that_outlive_the_mesh(self):
@@ -70,9 +71,11 @@ class Arrays(unittest.TestCase):
         points = np.round(points * 64) / 64  # which half precision holds, too
         expected = hermesh.Mesh(points, triangles)
         for kind in (np.float16, np.float32, np.float64, np.dtype(">f4"), np.dtype(">f8"), np.longdouble):
-            np.testing.assert_array_equal(hermesh.Mesh(points.astype(kind), triangles).points, expected.points)
+            np.testing.assert_array_equal(hermesh.Mesh(points.astype(kind), triangles).points,
+                                          expected.points)
         for kind in (np.int16, np.uint16, np.int32, np.uint32, np.int64, np.uint64, np.dtype(">i4")):
-            np.testing.assert_array_equal(hermesh.Mesh(points, triangles.astype(kind)).triangles, expected.triangles)
+            np.testing.assert_array_equal(hermesh.Mesh(points, triangles.astype(kind)).triangles,
+                                          expected.triangles)
         by_columns = hermesh.Mesh(np.asfortranarray(points), np.asfortranarray(triangles))
         np.testing.assert_array_equal(by_columns.points, expected.points)
         np.testing.assert_array_equal(by_columns.triangles, expected.triangles)
@@ -82,7 +85,8 @@ class Arrays(unittest.TestCase):
     def test_keep_precision_far_from_zero(self):
         points, quads = cube(1.0, (1e7, 0, -1e7))
         mesh = hermesh.Mesh(points, None, quads)
-        np.testing.assert_array_equal(mesh.world_points(), points)  # single precision about 0 would have steps of 1
+        # single precision about 0 would have steps of 1
+        np.testing.assert_array_equal(mesh.world_points(), points)
         self.assertNotEqual(mesh.origin[0], 0)
 
     def test_of_attributes(self):
@@ -90,8 +94,9 @@ class Arrays(unittest.TestCase):
         normals = np.arange(24, dtype=np.float32).reshape(8, 3)
         parts = np.array([7, 8, -1, 0, 0, 0], np.int32)
         uv = np.linspace(0, 1, 48).reshape(24, 2)
-        mesh = hermesh.Mesh(points, None, quads, point_attributes={"normal": normals}, polygon_attributes={"part": parts},
-                            corner_attributes={"uv": uv}, labels={"part": ["a", "b"]})
+        mesh = hermesh.Mesh(points, None, quads, point_attributes={"normal": normals},
+                            polygon_attributes={"part": parts}, corner_attributes={"uv": uv},
+                            labels={"part": ["a", "b"]})
         np.testing.assert_array_equal(mesh.point_attributes["normal"], normals)
         np.testing.assert_array_equal(mesh.polygon_attributes["part"], parts)
         self.assertEqual(mesh.polygon_attributes["part"].dtype, np.int32)
@@ -128,8 +133,8 @@ class Arrays(unittest.TestCase):
         triangles = np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])
         trimesh_like = types.SimpleNamespace(vertices=points, faces=triangles)
         meshio_like = types.SimpleNamespace(points=points, cells_dict={"quad": quads}, point_data={})
-        for mesh in (hermesh.Mesh(points, None, quads), (points, quads), (points, triangles), (points, None, quads), trimesh_like,
-                     meshio_like):
+        for mesh in (hermesh.Mesh(points, None, quads), (points, quads), (points, triangles),
+                     (points, None, quads), trimesh_like, meshio_like):
             self.assertAlmostEqual(volume_of(hermesh.remesh(mesh, resolution=20)), 8.0, places=4)
         with self.assertRaises(TypeError):
             hermesh.remesh(7, resolution=20)

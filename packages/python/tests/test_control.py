@@ -129,11 +129,14 @@ class Control(unittest.TestCase):
         self.assertIn(log.notes[0], {str(w.message) for w in caught})
 
     def test_errors_are_sentences(self):
-        for options, words in (({}, "exactly one of"), ({"resolution": 10, "voxel_size": 1.0}, "exactly one of"),
-                               ({"resolution": 10, "extractor": "marching-squares"}, "there is no extractor 'marching-squares'"),
+        for options, words in (({}, "exactly one of"),
+                               ({"resolution": 10, "voxel_size": 1.0}, "exactly one of"),
+                               ({"resolution": 10, "extractor": "marching-squares"},
+                                "there is no extractor 'marching-squares'"),
                                ({"resolution": 10, "tolerence": 0.1}, "has no option 'tolerence'"),
                                ({"resolution": 10, "tolerance": -1}, "tolerance"),
-                               ({"resolution": 10, "signs": "auto", "voxelizer_options": {"signs": "auto"}}, "given twice")):
+                               ({"resolution": 10, "signs": "auto", "voxelizer_options": {"signs": "auto"}},
+                                "given twice")):
             with self.assertRaisesRegex(hermesh.Error, words):
                 hermesh.remesh(cube(), **options)
         with self.assertRaisesRegex(hermesh.Error, "not 'xor'"):
@@ -155,7 +158,8 @@ class Control(unittest.TestCase):
     def test_booleans_have_their_volumes(self):
         a, b = cube(), cube(1.0, (0.5, 0.5, 0.5))
         for operation, volume in (("union", 1.875), ("intersection", 0.125), ("difference", 0.875)):
-            self.assertAlmostEqual(volume_of(hermesh.combine(operation, a, b, resolution=30)), volume, places=3)
+            self.assertAlmostEqual(volume_of(hermesh.combine(operation, a, b, resolution=30)), volume,
+                                   places=3)
 
     def test_an_open_mesh_has_defects_with_places(self):
         points, quads = cube()
@@ -178,7 +182,8 @@ class Control(unittest.TestCase):
         for module in (_core, _validation):
             file = pathlib.Path(hermesh.__file__).with_name(module.__name__.split(".")[1] + ".pyi")
             stubs = ast.parse(file.read_text(encoding="utf-8"))
-            named = {node.name: node for node in stubs.body if isinstance(node, (ast.ClassDef, ast.FunctionDef))}
+            named = {node.name: node for node in stubs.body
+                     if isinstance(node, (ast.ClassDef, ast.FunctionDef))}
             there = {name for name in vars(module) if not name.startswith("_")}
             self.assertEqual(set(named), there)
             for name, node in named.items():
@@ -191,7 +196,8 @@ class Control(unittest.TestCase):
 
     def test_every_function_says_what_it_does(self):
         for name in hermesh.__all__:
-            self.assertGreater(len(getattr(hermesh, name).__doc__ or ""), 15 if name not in ("Error", "Cancelled") else -1, name)
+            self.assertGreater(len(getattr(hermesh, name).__doc__ or ""),
+                               15 if name not in ("Error", "Cancelled") else -1, name)
 
 
 if __name__ == "__main__":

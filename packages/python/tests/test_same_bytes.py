@@ -26,12 +26,14 @@ class SameBytes(unittest.TestCase):
 
     def program(self, *arguments):
         """What the program prints; its files are looked at by the caller."""
-        done = subprocess.run([os.environ["HERMESH_PROGRAM"], *map(str, arguments)], capture_output=True, text=True)
+        done = subprocess.run([os.environ["HERMESH_PROGRAM"], *map(str, arguments)], capture_output=True,
+                              text=True)
         self.assertEqual(done.returncode, 0, done.stderr)
         return done.stdout
 
     def compare(self, result, end, *arguments):
-        """Whether the program writes with these arguments, and the path behind them, what the result is written as."""
+        """Checks that the program, with these arguments followed by a path, writes the same bytes as the
+        result."""
         theirs, ours = self.folder / ("program" + end), self.folder / ("module" + end)
         self.program(*arguments, theirs)
         result.write(ours)
@@ -39,13 +41,17 @@ class SameBytes(unittest.TestCase):
         self.assertEqual(theirs.read_bytes(), ours.read_bytes())
 
     def test_of_remesh(self):
-        self.compare(hermesh.remesh(self.torus, resolution=50), ".ply", "remesh", self.torus, "--resolution", 50)
+        self.compare(hermesh.remesh(self.torus, resolution=50), ".ply", "remesh", self.torus, "--resolution",
+                     50)
         # Arrays give the same result as their file.
-        self.compare(hermesh.remesh(torus(), voxel_size=0.05, tolerance=0.3, signs="winding-number", exterior_band=4), ".obj",
-                     "remesh", self.torus, "--voxel-size", 0.05, "-o", "tolerance=0.3", "--signs", "winding-number",
-                     "--exterior-band", 4)
-        self.compare(hermesh.remesh(self.torus, resolution=40, extractor="certified-octree", flatness=0.2, threads=1), ".ply",
-                     "remesh", self.torus, "--resolution", 40, "--extractor", "certified-octree", "-o", "flatness=0.2")
+        self.compare(hermesh.remesh(torus(), voxel_size=0.05, tolerance=0.3, signs="winding-number",
+                                    exterior_band=4), ".obj",
+                     "remesh", self.torus, "--voxel-size", 0.05, "-o", "tolerance=0.3", "--signs",
+                     "winding-number", "--exterior-band", 4)
+        self.compare(hermesh.remesh(self.torus, resolution=40, extractor="certified-octree", flatness=0.2,
+                                    threads=1), ".ply",
+                     "remesh", self.torus, "--resolution", 40, "--extractor", "certified-octree", "-o",
+                     "flatness=0.2")
 
     def test_of_remesh_within(self):
         made = hermesh.remesh_within(self.torus, error=0.03)
@@ -55,31 +61,33 @@ class SameBytes(unittest.TestCase):
             hermesh.remesh_within(self.torus)
 
     def test_of_quads(self):
-        self.compare(hermesh.remesh(cube(1.0, (0.5, 0, -0.5)), resolution=30, extractor="dual-contouring"), ".ply", "remesh",
-                     self.cube, "--resolution", 30, "--extractor", "dual-contouring")
+        self.compare(hermesh.remesh(cube(1.0, (0.5, 0, -0.5)), resolution=30, extractor="dual-contouring"),
+                     ".ply", "remesh", self.cube, "--resolution", 30, "--extractor", "dual-contouring")
 
     def test_of_voxelize_and_extract(self):
         level_set = hermesh.voxelize(self.torus, resolution=40, interior_band=5)
         self.compare(level_set, ".vdb", "voxelize", self.torus, "--resolution", 40, "--interior-band", 5)
         volume = self.folder / "program.vdb"
-        self.compare(hermesh.extract(hermesh.read_vdb(volume), extractor="marching-cubes", isovalue=0.05), ".off", "extract",
-                     volume, "--extractor", "marching-cubes", "--isovalue", 0.05)
-        self.compare(hermesh.extract(level_set, source=self.torus, hermite="exact"), ".ply", "extract", volume, "--source",
-                     self.torus, "-o", "hermite=exact")
+        self.compare(hermesh.extract(hermesh.read_vdb(volume), extractor="marching-cubes", isovalue=0.05),
+                     ".off", "extract", volume, "--extractor", "marching-cubes", "--isovalue", 0.05)
+        self.compare(hermesh.extract(level_set, source=self.torus, hermite="exact"), ".ply", "extract",
+                     volume, "--source", self.torus, "-o", "hermite=exact")
 
     def test_of_combine(self):
         for operation in ("union", "intersection", "difference"):
             mesh = hermesh.combine(operation, self.torus, self.cube, resolution=40, tolerance=0.2)
             theirs, ours = self.folder / "program.ply", self.folder / "module.ply"
-            self.program("combine", operation, self.torus, self.cube, theirs, "--resolution", 40, "-o", "tolerance=0.2")
+            self.program("combine", operation, self.torus, self.cube, theirs, "--resolution", 40, "-o",
+                         "tolerance=0.2")
             mesh.write(ours)
             self.assertEqual(theirs.read_bytes(), ours.read_bytes())
 
     def test_of_fracture(self):
-        fracture = hermesh.fracture(self.torus, "chunks:6", resolution=40, seed=3, min_volume=10, impact=(1, 0, 0))
+        fracture = hermesh.fracture(self.torus, "chunks:6", resolution=40, seed=3, min_volume=10,
+                                    impact=(1, 0, 0))
         pieces = self.folder / "pieces"
-        self.program("fracture", self.torus, pieces, "--resolution", 40, "--cutters", "chunks:6", "--seed", 3, "--min-volume", 10,
-                     "--impact", 1, 0, 0, "--no-picture")
+        self.program("fracture", self.torus, pieces, "--resolution", 40, "--cutters", "chunks:6", "--seed", 3,
+                     "--min-volume", 10, "--impact", 1, 0, 0, "--no-picture")
         files = sorted(pieces.glob("*.ply"))
         self.assertEqual(len(files), len(fracture))
         self.assertGreaterEqual(len(files), 6)
@@ -94,12 +102,14 @@ class SameBytes(unittest.TestCase):
         raw.write_bytes(gzip.compress(samples.tobytes(), mtime=0))
         volume = hermesh.import_volume(raw, dims=(8, 7, 6), type="int16", spacing=(0.5, 0.5, 2))
         np.testing.assert_array_equal(volume.to_numpy(), samples.transpose())  # x is fastest in the file
-        self.compare(volume, ".vdb", "import", raw, "--dims", "8,7,6", "--type", "int16", "--spacing", "0.5,0.5,2")
+        self.compare(volume, ".vdb", "import", raw, "--dims", "8,7,6", "--type", "int16", "--spacing",
+                     "0.5,0.5,2")
 
     def test_of_validate(self):
         mesh = self.folder / "mesh.ply"
         hermesh.remesh(self.torus, resolution=30).write(mesh)
-        theirs = json.loads(self.program("validate", mesh, "--reference", self.torus, "--json", "--certify", "--samples", 5000))
+        theirs = json.loads(self.program("validate", mesh, "--reference", self.torus, "--json", "--certify",
+                                         "--samples", 5000))
         report = hermesh.validate(mesh, reference=self.torus, certify=True, samples=5000)
         ours = report.to_dict()
         # The program adds values such as the file's name.
@@ -114,7 +124,8 @@ class SameBytes(unittest.TestCase):
         broken = self.folder / "broken.ply"
         broken.write_bytes(self.torus.read_bytes()[:2000])
         for path in (broken, self.folder / "absent.ply"):
-            done = subprocess.run([os.environ["HERMESH_PROGRAM"], "remesh", path, self.folder / "out.ply", "--resolution", "40"],
+            done = subprocess.run([os.environ["HERMESH_PROGRAM"], "remesh", path, self.folder / "out.ply",
+                                   "--resolution", "40"],
                                   capture_output=True, text=True)
             self.assertEqual(done.returncode, 1)
             with self.assertRaises(hermesh.Error) as caught:
