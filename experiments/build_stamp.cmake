@@ -1,14 +1,17 @@
-# Writes the source file OUTPUT that says from which commit of the checkout SOURCE_DIR the program is built, and whether
-# files differ from it; pages and results are no part of a program. Run by each build, and writes only what changed.
+# Writes the source file OUTPUT, which records the commit of the checkout SOURCE_DIR from which the program is
+# built, and whether files differ from it; pages and results are not part of a program. Runs in each build,
+# and writes only changes.
 function(ask_git result output)
-  execute_process(COMMAND git -C ${SOURCE_DIR} ${ARGN} OUTPUT_VARIABLE text RESULT_VARIABLE failure ERROR_QUIET
+  execute_process(COMMAND git -C ${SOURCE_DIR} ${ARGN} OUTPUT_VARIABLE text RESULT_VARIABLE failure
+    ERROR_QUIET
     OUTPUT_STRIP_TRAILING_WHITESPACE)
   set(${output} "${text}" PARENT_SCOPE)
   set(${result} "${failure}" PARENT_SCOPE)
 endfunction()
 
 ask_git(failure commit rev-parse --verify HEAD)
-ask_git(status_failure changes status --porcelain -- ":(top)" ":(top,exclude)results" ":(top,exclude)paper" ":(top,exclude,glob)**/*.md")
+ask_git(status_failure changes status --porcelain -- ":(top)" ":(top,exclude)results" ":(top,exclude)paper"
+  ":(top,exclude,glob)**/*.md")
 set(dirty "std::nullopt")
 if(NOT failure STREQUAL "0")
   set(commit "unknown")

@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
-# Checks the directions of includes that ARCHITECTURE.md specifies: experiments/check_arrows.sh; seconds, builds nothing. Tests and
-# their helpers may include anything. Exits with 1 and lists each include that points another way.
+# Checks the directions of includes that ARCHITECTURE.md specifies: experiments/check_arrows.sh; seconds,
+# builds nothing. Tests and their helpers may include anything. Exits with 1 and lists each include that
+# violates them.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Whether the extractor that CONTRIBUTING.md shows whole still compiles, with its entry in the table of variants:
-# experiments/check_guide.sh BUILD-FOLDER; seconds. Exits with 1 and the compiler's words.
+# Checks that the extractor in CONTRIBUTING.md still compiles, with its entry in the table of variants:
+# experiments/check_guide.sh BUILD-FOLDER; seconds. Exits with 1 and the compiler's messages.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 build=$1

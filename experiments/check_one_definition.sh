@@ -17,8 +17,8 @@ build() {  # folder, then options of CMake
   cmake --build "$folder" --target hermesh hermesh-lab -j "$jobs" >> "$folder.log" 2>&1 || { tail -40 "$folder.log"; exit 1; }
 }
 
-# A class or an enumeration at the scope of a namespace that has a name, defined in two files. Files with a main() or
-# with tests are programs of their own.
+# A class or an enumeration in a named namespace that is defined in two files. Files with a main() or with
+# tests are separate programs.
 check_names() {
   find algorithms reference validation experiments packages/cpp -name node_modules -prune -o \( -name '*.h' -o -name '*.cpp' ! -name '*_test.cpp' ! -name main.cpp \) -print |
     grep -v '^experiments/bench/' | sort | xargs awk '

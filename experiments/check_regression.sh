@@ -8,7 +8,8 @@ program=$1 experiment=$2 folder=$3
 root=$(cd "$(dirname "$0")/.." && pwd)
 
 rm -rf "$folder"
-# Exit codes 1 and 3 say that a variant failed or broke a promise, as some of those accepted do; the comparison tells.
+# Exit codes 1 and 3 mean that a variant failed or violated a guarantee, as in some accepted rows; the
+# comparison decides.
 code=0
 "$program" run "$experiment" --out "$folder" --quiet >/dev/null || code=$?
 case $code in 0 | 1 | 3) ;; *) exit "$code" ;; esac

@@ -1,5 +1,5 @@
-# Sourced by ./reproduce and ./test: install_packages NAME… installs what is missing of the distribution's packages, or
-# without root names it and stops.
+# Sourced by ./reproduce and ./test: install_packages NAME… installs the missing packages of the distribution,
+# or, without root, lists them and stops.
 
 # To build, run and test the program.
 hermesh_packages=(

@@ -1,9 +1,10 @@
 #!/usr/bin/env bash
-# The first stage of packages/Containerfile, at work in /src: builds the program into /usr/local/bin, and lists the distribution's
-# packages whose libraries it loads in /usr/local/share/hermesh-packages.
+# The first stage of packages/Containerfile, at work in /src: builds the program into /usr/local/bin, and
+# lists the distribution's packages whose libraries it loads in /usr/local/share/hermesh-packages.
 set -euo pipefail
 cd "$(dirname "$0")/.."
-# The build folder is the preset's, so that a mounted cache of ccache that the preset filled elsewhere is of use.
+# The build directory is the preset's, so that a mounted ccache cache that the preset filled elsewhere can be
+# reused.
 cmake --preset release -DHERMESH_BUILD_TESTS=OFF -DHERMESH_BUILD_BENCHMARKS=OFF -DHERMESH_BUILD_PYTHON=OFF
 ninja -C build/release hermesh hermesh-lab
 for program in hermesh hermesh-lab; do strip -o /usr/local/bin/$program build/release/$program; done

@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
-# Builds the Debian packages and the wheel: packages/make_packages.sh [BUILD], build/packages unless said; as long as the program
-# takes, or what ccache leaves of it. They lie in BUILD/debian in the end, and lintian, where it is installed, must find no error
-# in the packages. packages/check_clean_debian.sh tries them where nothing else is installed.
+# Builds the Debian packages and the wheel: packages/make_packages.sh [BUILD], build/packages by default;
+# takes as long as building the program, less with ccache. Writes them to BUILD/debian; lintian, if installed,
+# must find no error in the packages. packages/check_clean_debian.sh tests them on a clean system.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 build=${1:-build/packages}

@@ -1,10 +1,11 @@
 #!/usr/bin/env bash
-# Whether a sweep whose jobs are killed makes the rows of one run: experiments/sweep/prove_slurm.sh [FOLDER], a few minutes, on
-# a Slurm cluster that SLURM_CONF or the system's configuration names (experiments/sweep/one_node_slurm.sh makes one of this
-# machine). Runs the 24 cells of proof.toml undivided, then as three shards that are Slurm jobs of Snakemake, with the profile
-# of slurm/. In the middle of one shard its job is cancelled, and in the middle of another the process is killed with signal 9;
-# Snakemake submits both again. Exits with 0 if both were killed in the middle, what they had made was kept and not made again,
-# and the merged rows are those of the undivided run, none lost or doubled.
+# Checks that a sweep whose jobs are killed makes the rows of one run: experiments/sweep/prove_slurm.sh
+# [FOLDER], a few minutes, on a Slurm cluster that SLURM_CONF or the system's configuration names
+# (experiments/sweep/one_node_slurm.sh makes one of this machine). Runs the 24 cells of proof.toml undivided,
+# then as three shards that are Slurm jobs of Snakemake, with the profile of slurm/. In the middle of one
+# shard its job is cancelled, and in the middle of another the process is killed with signal 9; Snakemake
+# submits both again. Exits with 0 if both were killed in the middle, what they had made was kept and not made
+# again, and the merged rows are those of the undivided run, none lost or doubled.
 set -euo pipefail
 here=$(cd "$(dirname "$0")" && pwd)
 root=$(cd "$here/../.." && pwd)

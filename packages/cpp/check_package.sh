@@ -1,9 +1,10 @@
 #!/usr/bin/env bash
-# Checks that another program can be built against the installed libraries: packages/cpp/check_package.sh BUILD [--shared]; a
-# quarter of a minute. With --shared it checks a build of shared libraries next to BUILD, whose objects ccache has from BUILD.
-# Installs the libraries and headers of a build into BUILD/package_check, compiles packages/cpp/example against them, which must
-# take less than 20 s, and runs it; counts headers and symbols, and prints sizes. Shared libraries must export only public names.
-# Inside another project no test of ours may be built, and no warning be an error. Exits with 1 and a message on failure.
+# Checks that another program can be built against the installed libraries: packages/cpp/check_package.sh
+# BUILD [--shared]; a quarter of a minute. With --shared it checks a build of shared libraries next to BUILD,
+# whose objects ccache has from BUILD. Installs the libraries and headers of a build into BUILD/package_check,
+# compiles packages/cpp/example against them, which must take less than 20 s, and runs it; counts headers and
+# symbols, and prints sizes. Shared libraries must export only public names. Inside another project no test of
+# ours may be built, and no warning be an error. Exits with 1 and a message on failure.
 set -euo pipefail
 cd "$(dirname "$0")"
 build=$1

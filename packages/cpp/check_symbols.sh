@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
-# Checks the exported symbols of shared libraries: packages/cpp/check_symbols.sh LIBRARY...; an instant. Counts the names of each,
-# and exits with 1 if one is not public: of another namespace, or internal to the public functions.
+# Checks the exported symbols of shared libraries: packages/cpp/check_symbols.sh LIBRARY...; an instant.
+# Counts the names of each, and exits with 1 if one is not public: of another namespace, or internal to the
+# public functions.
 set -euo pipefail
 for library in "$@"; do
   names=$(nm -D --defined-only -C "$library" | sed -E 's/^[0-9a-f]* *[A-Za-z] //')

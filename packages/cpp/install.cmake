@@ -9,7 +9,8 @@ if(HERMESH_BUILD_VALIDATION)
 endif()
 set(libraries)
 foreach(room ${rooms})
-  target_include_directories(hermesh_public_${room} INTERFACE $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}>)
+  target_include_directories(hermesh_public_${room} INTERFACE
+    $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}>)
   list(APPEND libraries hermesh_public_${room})
   if(NOT BUILD_SHARED_LIBS)
     set_target_properties(hermesh_${room} PROPERTIES EXPORT_NAME ${room}_archive)
@@ -23,7 +24,8 @@ if(BUILD_SHARED_LIBS)
       LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR} COMPONENT validation NAMELINK_COMPONENT development)
   endif()
 else()
-  # Static libraries do not contain their dependencies; the package file finds these on the machine of the program that links them.
+  # Static libraries do not contain their dependencies; the package file finds these on the machine where a
+  # program is linked.
   target_link_libraries(hermesh_hermite INTERFACE $<INSTALL_INTERFACE:hermesh::needs>)
   if(HERMESH_BUILD_VALIDATION)
     target_link_libraries(hermesh_validation INTERFACE $<INSTALL_INTERFACE:hermesh::validation_needs>)
@@ -35,10 +37,13 @@ install(TARGETS ${libraries} EXPORT hermeshTargets
   ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR} COMPONENT development)
 set(package_folder ${CMAKE_INSTALL_LIBDIR}/cmake/hermesh)
 install(EXPORT hermeshTargets NAMESPACE hermesh:: DESTINATION ${package_folder} COMPONENT development)
-configure_package_config_file(packages/cpp/hermeshConfig.cmake.in ${PROJECT_BINARY_DIR}/packages/cpp/hermeshConfig.cmake
+configure_package_config_file(packages/cpp/hermeshConfig.cmake.in
+  ${PROJECT_BINARY_DIR}/packages/cpp/hermeshConfig.cmake
   INSTALL_DESTINATION ${package_folder})
-write_basic_package_version_file(${PROJECT_BINARY_DIR}/packages/cpp/hermeshConfigVersion.cmake COMPATIBILITY SameMajorVersion)
-install(FILES ${PROJECT_BINARY_DIR}/packages/cpp/hermeshConfig.cmake ${PROJECT_BINARY_DIR}/packages/cpp/hermeshConfigVersion.cmake
+write_basic_package_version_file(${PROJECT_BINARY_DIR}/packages/cpp/hermeshConfigVersion.cmake
+  COMPATIBILITY SameMajorVersion)
+install(FILES ${PROJECT_BINARY_DIR}/packages/cpp/hermeshConfig.cmake
+  ${PROJECT_BINARY_DIR}/packages/cpp/hermeshConfigVersion.cmake
   DESTINATION ${package_folder} COMPONENT development)
 install(DIRECTORY packages/cpp/include/hermesh ${PROJECT_BINARY_DIR}/packages/cpp/include/hermesh
   DESTINATION ${CMAKE_INSTALL_INCLUDEDIR} COMPONENT development FILES_MATCHING PATTERN "*.h")

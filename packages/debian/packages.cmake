@@ -24,8 +24,8 @@ set(CPACK_DEBIAN_PACKAGE_GENERATE_SHLIBS_POLICY >=)
 # Where the libraries of one package lie while those of another are looked for.
 set(CPACK_DEBIAN_PACKAGE_SHLIBDEPS_PRIVATE_DIRS ${PROJECT_BINARY_DIR}/packages/cpp)
 
-# hermesh_package(COMPONENT NAME SECTION SUMMARY TEXT): what a component's package is called and says of itself, with its
-# copyright and changelog.
+# hermesh_package(COMPONENT NAME SECTION SUMMARY TEXT): what a component's package is called and says of
+# itself, with its copyright and changelog.
 set(hermesh_components)
 macro(hermesh_package component name section summary text)
   list(APPEND hermesh_components ${component})
@@ -33,7 +33,8 @@ macro(hermesh_package component name section summary text)
   set(CPACK_DEBIAN_${upper}_PACKAGE_NAME ${name})
   set(CPACK_DEBIAN_${upper}_PACKAGE_SECTION ${section})
   set(CPACK_COMPONENT_${upper}_DESCRIPTION "${summary}\n${text}")
-  install(FILES ${PROJECT_SOURCE_DIR}/packages/debian/copyright ${PROJECT_BINARY_DIR}/packages/changelog.Debian.gz
+  install(FILES ${PROJECT_SOURCE_DIR}/packages/debian/copyright
+    ${PROJECT_BINARY_DIR}/packages/changelog.Debian.gz
     DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/${name} COMPONENT ${component})
 endmacro()
 # The time within a compressed file would make each build's another.
@@ -56,7 +57,8 @@ alone, and the files by which find_package(hermesh) of CMake finds all.")
 set(CPACK_DEBIAN_DEVELOPMENT_PACKAGE_DEPENDS "libhermesh1 ${same}")
 set(CPACK_DEBIAN_DEVELOPMENT_PACKAGE_RECOMMENDS libopenvdb-dev)
 if(HERMESH_BUILD_VALIDATION)
-  hermesh_package(validation libhermesh-validation1 libs "polygons to sparse volumes and back - judges of meshes"
+  hermesh_package(validation libhermesh-validation1 libs
+    "polygons to sparse volumes and back - judges of meshes"
 "Topology, self-intersections, certified Hausdorff distances, comparison of
 solids, and whether the pieces of a fracture fit. This package holds the
 shared library, which is under GPL-3.")
@@ -71,7 +73,8 @@ if(TARGET hermesh_python)
   hermesh_package(python python3-hermesh python "polygons to sparse volumes and back - Python module" "${what}
 This package holds the Python module, with volumes and meshes as numpy arrays.")
   # Extension modules are for the version of Python that they are built for.
-  execute_process(COMMAND ${PYTHON_EXECUTABLE} -c "import sys; print(*sys.version_info[:2]); print(sys.version_info[1] + 1)"
+  execute_process(COMMAND ${PYTHON_EXECUTABLE} -c
+    "import sys; print(*sys.version_info[:2]); print(sys.version_info[1] + 1)"
     OUTPUT_VARIABLE python_version COMMAND_ERROR_IS_FATAL ANY)
   string(REGEX MATCHALL "[0-9]+" python_version "${python_version}")
   list(GET python_version 0 major)

@@ -1,9 +1,11 @@
-# Sets hermesh_python_is_built from HERMESH_BUILD_PYTHON and the installed packages; prints the reason if it is off.
+# Sets hermesh_python_is_built from HERMESH_BUILD_PYTHON and the installed packages; prints the reason if it
+# is off.
 set(hermesh_python_is_built OFF)
 if(NOT PROJECT_IS_TOP_LEVEL OR (NOT HERMESH_BUILD_PYTHON STREQUAL "AUTO" AND NOT HERMESH_BUILD_PYTHON))
   return()
 endif()
-set(PYTHON_EXECUTABLE /usr/bin/python3 CACHE FILEPATH "Python that the module hermesh is built for: the distribution's")
+set(PYTHON_EXECUTABLE /usr/bin/python3 CACHE FILEPATH
+  "Python that the module hermesh is built for: the distribution's")
 set(missing)
 if(HERMESH_SANITIZE)
   set(missing "a build without sanitizers, which Python does not load")

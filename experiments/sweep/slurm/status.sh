@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# What became of a Slurm job, in the words that Snakemake wants: running, success or failed. Jobs that the controller has
-# forgotten are looked up in the accounts, where there are any.
+# Prints the state of a Slurm job in Snakemake's terms: running, success or failed. Jobs that the controller
+# no longer knows are looked up in the accounting data, if there is any.
 set -euo pipefail
 job=$1
 state=$(scontrol --oneliner show job "$job" 2>/dev/null | grep -o 'JobState=[A-Z_]*' | cut -d= -f2) || true
