@@ -5,53 +5,10 @@
 #include <atomic>
 #include <filesystem>
 
-#include "algorithms/io/written_precision.h"
 #include "experiments/measure.h"
 
 namespace hermesh {
 using validation::MeshReport;
-
-ChosenVoxelizer choose(std::span<const Voxelizer> table, const std::string& name, const GivenOptions& given) {
-  const Voxelizer& voxelizer = find_variant(table, name);
-  return {voxelizer, Options(name, voxelizer.options, given)};
-}
-
-ChosenExtractor choose(std::span<const Extractor> table, const std::string& name, const GivenOptions& given) {
-  const Extractor& extractor = find_variant(table, name);
-  return {extractor, Options(name, extractor.options, given)};
-}
-
-double voxel_size_of(const VoxelizeRecipe& recipe, const PolygonMesh& mesh) {
-  return recipe.voxel_size ? *recipe.voxel_size : bounds(mesh).size().maxCoeff() / recipe.resolution;
-}
-
-VoxelizationInput voxelization_input(const PolygonMesh& mesh, const VoxelizeRecipe& recipe,
-                                     RunContext& context) {
-  return {.mesh = mesh,
-          .voxel_size = voxel_size_of(recipe, mesh),
-          .exterior_band = recipe.exterior_band,
-          .interior_band = recipe.interior_band,
-          .context = context,
-          .options = recipe.chosen.options};
-}
-
-LevelSet voxelize(const PolygonMesh& mesh, const VoxelizeRecipe& recipe, RunContext& context) {
-  return recipe.chosen.voxelizer.voxelize(voxelization_input(mesh, recipe, context));
-}
-
-EndedMesh extract(const LevelSet& volume, const PolygonMesh* source, const ExtractRecipe& recipe,
-                  RunContext& context) {
-  const ExtractionInput input = {.level_set = volume,
-                                 .isovalue = recipe.isovalue,
-                                 .source = source,
-                                 .options = recipe.chosen.options,
-                                 .context = context,
-                                 .field = recipe.field,
-                                 .hermite = recipe.hermite,
-                                 .written_in_single = recipe.written_in_single};
-  if (recipe.ends) return extract_with_ends(recipe.chosen.extractor, input, *recipe.ends);
-  return {recipe.chosen.extractor.extract(input), {}};
-}
 
 MeshFile as_written(const PolygonMesh& mesh, const std::string& format, RunContext& context) {
   if (mesh.empty()) return {};
@@ -176,10 +133,7 @@ Outcome run(const Job& job, RunContext& context) {
   if (job.source.load) polygons = &(result.polygons = job.source.load(context));
   result.volume = job.source.volume ? *job.source.volume : voxelize(*polygons, job.voxelize, context);
   ExtractRecipe recipe = job.extract;
-  if (!job.format.empty()) {
-    check_written_precision("mesh" + job.format, result.volume);
-    recipe.written_in_single = is_written_in_single("mesh" + job.format);
-  }
+  if (!job.format.empty()) recipe.out = "mesh" + job.format;
   result.extract_seconds = timed([&] { result.made = extract(result.volume, polygons, recipe, context); });
   if (!job.judge) return result;
   const PolygonMesh& mesh = result.made.mesh;

@@ -3,69 +3,15 @@
 #pragma once
 
 #include <functional>
-#include <map>
 #include <optional>
 #include <string>
 #include <vector>
 
-#include "algorithms/core/variant.h"
-#include "algorithms/extraction/volume_ends.h"
 #include "algorithms/io/mesh_file.h"
+#include "algorithms/remesh/remesh.h"
 #include "validation/mesh_report.h"
 
 namespace hermesh {
-
-using GivenOptions = std::map<std::string, std::string>;
-
-/// A method with its validated options.
-struct ChosenVoxelizer {
-  Voxelizer voxelizer;
-  Options options;
-};
-struct ChosenExtractor {
-  Extractor extractor;
-  Options options;
-};
-
-/// Looks a method up. @throws Error for an unknown name, option or value.
-ChosenVoxelizer choose(std::span<const Voxelizer> table, const std::string& name,
-                       const GivenOptions& given = {});
-ChosenExtractor choose(std::span<const Extractor> table, const std::string& name,
-                       const GivenOptions& given = {});
-
-/// Parameters of a voxelization.
-struct VoxelizeRecipe {
-  ChosenVoxelizer chosen = {};
-  double resolution = 100.0;              ///< voxels along the longest side of the polygons' box
-  std::optional<double> voxel_size = {};  ///< world units, instead of a resolution
-  double exterior_band = 3.0;             ///< voxels
-  double interior_band = 3.0;             ///< voxels
-};
-
-/// Parameters of an extraction.
-struct ExtractRecipe {
-  ChosenExtractor chosen = {};
-  double isovalue = 0.0;  ///< in the units of the volume's values
-  /// Treatment of a surface that runs into the end of the data; none for level sets of polygons, which have
-  /// no ends.
-  std::optional<Ends> ends = {};
-  const AdaptivityField* field = nullptr;  ///< as in ExtractionInput, like the two below
-  const SparseHermite<EdgeCrossing>* hermite = nullptr;
-  bool written_in_single = false;
-};
-
-/// Returns the voxel size in world units. 0 or not finite for a resolution of a mesh without extent, which
-/// voxelizers reject.
-double voxel_size_of(const VoxelizeRecipe& recipe, const PolygonMesh& mesh);
-VoxelizationInput voxelization_input(const PolygonMesh& mesh, const VoxelizeRecipe& recipe,
-                                     RunContext& context);
-
-/// @throws as the voxelizer.
-LevelSet voxelize(const PolygonMesh& mesh, const VoxelizeRecipe& recipe, RunContext& context);
-
-/// `source`: the polygons that the volume was made from; null if unknown. @throws as the extractor.
-EndedMesh extract(const LevelSet& volume, const PolygonMesh* source, const ExtractRecipe& recipe,
-                  RunContext& context);
 
 /// Returns the mesh as a temporary file of that format (".ply") holds it, since guarantees apply to files:
 /// with the rounding of the writer and the welding of the reader. A mesh without polygons gives an empty

@@ -4,7 +4,6 @@
 
 #include "algorithms/core/run_context.h"
 #include "algorithms/hermite/solids.h"
-#include "algorithms/io/written_precision.h"
 #include "experiments/cli/cli11.h"
 #include "experiments/cli/conversions.h"
 #include "experiments/cli/signals.h"
@@ -32,7 +31,7 @@ std::string result_name(const CombineArguments& arguments) {
 SampledSolid sampled(const PolygonMesh& mesh, const std::string& file, const SharedLattice& lattice,
                      const VoxelizeArguments& voxelizing, Session& session) {
   const auto sample = [&](const PolygonMesh& framed) {
-    return sample_polygons(framed, file, voxelizing, session).solid;
+    return make_solid(framed, file, voxelizing, session).solid;
   };
   SampledSolid solid = about_file(file, [&] { return sample_solid(mesh, lattice, sample); });
   if (const std::string note = missed_edges_note(solid.sampling); !note.empty())
@@ -43,12 +42,10 @@ SampledSolid sampled(const PolygonMesh& mesh, const std::string& file, const Sha
 PolygonMesh contour(const CombinedSolid& solid, const CombineArguments& arguments, Session& session) {
   Stopwatch watch;
   const ChosenExtractor& chosen = arguments.extracting.chosen;
-  PolygonMesh mesh = hermesh::extract(solid.level_set, nullptr,
-                                      {.chosen = chosen,
-                                       .hermite = &solid.hermite,
-                                       .written_in_single = is_written_in_single(arguments.out)},
-                                      session.context)
-                         .mesh;
+  PolygonMesh mesh =
+      hermesh::extract(solid.level_set, nullptr,
+                       {.chosen = chosen, .hermite = &solid.hermite, .out = arguments.out}, session.context)
+          .mesh;
   session.context.check();
   if (mesh.empty()) throw Error(result_name(arguments) + " has no surface, nothing was written");
   print_extracted(session, mesh, chosen.extractor.name, watch.seconds());
@@ -100,7 +97,6 @@ int run_combine(CombineArguments& arguments, Session& session) {
     throw Error(result_name(arguments) +
                 " is empty, nothing was written: no sample and no edge of the lattice lies in it");
   if (lost.edges > 0) session.context.note(note);
-  check_written_precision(arguments.out, result.level_set);
   made(session, "crossings", result.hermite.crossings.size());
   print_summary(session, "combined to " + std::to_string(result.hermite.crossings.size()) +
                              " edge crossings, " + seconds_text(watch.seconds()));

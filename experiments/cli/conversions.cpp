@@ -5,8 +5,6 @@
 #include "algorithms/core/quad_diagonals.h"
 #include "algorithms/core/run_context.h"
 #include "algorithms/io/mesh_file.h"
-#include "algorithms/lattice/memory_estimate.h"
-#include "algorithms/voxelization/outputs/lost_surface.h"
 #include "experiments/cli/cli11.h"
 #include "experiments/cli/help.h"
 #include "experiments/variants.h"
@@ -28,7 +26,7 @@ void refuse_misspelled(const std::vector<Named>& table, const std::string& given
 /// Returns the method of that name with its options, given as key=value. @throws UsageError
 template <class Method>
 auto chosen_from(const std::vector<Method>& table, const std::string& kind, const std::string& name,
-                 const std::vector<std::string>& texts) {
+                 const std::vector<std::string>& texts, bool keep_open_sheets = false) {
   return as_usage([&] {
     refuse_misspelled(table, name, "there is no " + kind + " '" + name + "'");
     const Method& method = find_variant(table, name);
@@ -40,7 +38,7 @@ auto chosen_from(const std::vector<Method>& table, const std::string& kind, cons
     }
     for (const auto& [option, value] : given)
       refuse_misspelled(method.options, option, name + " has no option '" + option + "'");
-    return hermesh::choose(table, name, given);
+    return hermesh::choose(table, name, keep_open_sheets ? with_open_sheets(name, given) : given);
   });
 }
 
@@ -49,27 +47,21 @@ auto chosen_from(const std::vector<Method>& table, const std::string& kind, cons
 void VoxelizeArguments::choose() {
   std::vector<std::string> all = options;
   if (signs) all.push_back("signs=" + *signs);
-  // Open sheets are preserved if thin parts are.
-  const bool has_signs = std::ranges::any_of(all, [](const auto& o) { return o.starts_with("signs="); });
-  if (voxelizer == "hermesh" && !has_signs && thin.value_or("keep") == "keep")
-    all.push_back("signs=auto-sheets");
-  chosen = chosen_from(all_voxelizers(), "voxelizer", voxelizer, all);
+  chosen = chosen_from(all_voxelizers(), "voxelizer", voxelizer, all, thin.value_or("keep") == "keep");
 }
 
 void ExtractorArguments::choose() { chosen = chosen_from(all_extractors(), "extractor", extractor, options); }
 
 ThinRule VoxelizeArguments::thin_rule(double isovalue) const {
   if (thin == "drop") return ThinRule::drop;
-  const char* reason = chosen.voxelizer.name != "hermesh"       ? "the voxelizer is not hermesh"
-                       : chosen.options.is("signs", "unsigned") ? "unsigned distances have no inside"
-                       : isovalue != 0.0 ? "the surface of the isovalue is not that of the polygons"
-                                         : nullptr;
+  const char* reason = reason_to_drop_thin_parts(chosen, isovalue);
   if (reason && thin) throw UsageError("--thin " + *thin + " has no effect: " + reason);
   if (reason) return ThinRule::drop;
   return thin == "refuse" ? ThinRule::refuse : ThinRule::keep;
 }
 
-VoxelizeRecipe VoxelizeArguments::recipe(const PolygonMesh& mesh, const std::string& file) const {
+VoxelizeRecipe VoxelizeArguments::recipe(const PolygonMesh& mesh, const std::string& file,
+                                         double isovalue) const {
   const double longest_side = bounds(mesh).size().maxCoeff();
   if (voxel_size && *voxel_size > longest_side && !any_size)
     throw Error("'" + file + "' is smaller than a voxel: its longest side is " + text(longest_side) +
@@ -80,7 +72,8 @@ VoxelizeRecipe VoxelizeArguments::recipe(const PolygonMesh& mesh, const std::str
   return {.chosen = chosen,
           .voxel_size = voxel_size ? *voxel_size : longest_side / static_cast<double>(*resolution),
           .exterior_band = exterior_band,
-          .interior_band = interior_band};
+          .interior_band = interior_band,
+          .thin = thin_rule(isovalue)};
 }
 
 CLI::App* add_voxelize_options(CLI::App& command, VoxelizeArguments& arguments, bool with_like) {
@@ -152,40 +145,24 @@ PolygonMesh read_polygons(const std::string& path, Session& session, const ReadO
   return polygons_of(read_mesh_file(path, session.context, options), path, session);
 }
 
-LevelSet voxelize(const PolygonMesh& mesh, const std::string& file, const VoxelizeArguments& arguments,
-                  Session& session) {
-  const VoxelizeRecipe recipe = arguments.recipe(mesh, file);
-  const VoxelizationInput input = voxelization_input(mesh, recipe, session.context);
-  about_file(file, [&] {
-    check_voxelization_fits(mesh, input.voxel_size, input.exterior_band, input.interior_band);
-  });
-  Stopwatch watch;
-  LevelSet level_set = hermesh::voxelize(mesh, recipe, session.context);
-  session.context.check();
-  const Voxelizer& voxelizer = arguments.chosen.voxelizer;
-  print_voxelized(session, file, input, level_set.active_voxels(), voxelizer.name, watch.seconds());
-  if (arguments.thin_rule() == ThinRule::drop) note_lost_surface(mesh, level_set, voxelizer, session.context);
-  return level_set;
-}
-
-PolygonSolid sample_polygons(const PolygonMesh& mesh, const std::string& file,
-                             const VoxelizeArguments& arguments, Session& session) {
-  const LevelSet level_set = voxelize(mesh, file, arguments, session);
-  PolygonSolid made =
-      about_file(file, [&] { return solid_of(mesh, level_set, arguments.thin_rule(), session.context); });
-  note_thin_parts(made.thin, level_set.voxel_size(), session);
+MadeSolid make_solid(const PolygonMesh& mesh, const std::string& name, const VoxelizeArguments& arguments,
+                     Session& session) {
+  MadeSolid made = about_file(
+      name, [&] { return hermesh::make_solid(mesh, arguments.recipe(mesh, name), session.context); });
+  print_voxelized(session, name, mesh, made, arguments.chosen.voxelizer.name);
+  report_thin_parts(made.thin, session);
   return made;
 }
 
-void print_voxelized(Session& session, const std::string& file, const VoxelizationInput& input,
-                     std::size_t active_voxels, const std::string& voxelizer, double seconds) {
-  made(session, "polygons", input.mesh.triangle_count());
-  made(session, "voxels", active_voxels);
-  made(session, "voxel_size", input.voxel_size);
+void print_voxelized(Session& session, const std::string& file, const PolygonMesh& mesh,
+                     const VoxelizationFacts& facts, const std::string& voxelizer) {
+  made(session, "polygons", mesh.triangle_count());
+  made(session, "voxels", facts.voxels);
+  made(session, "voxel_size", facts.voxel_size);
   made(session, "voxelizer", voxelizer);
-  print_summary(session, "voxelized " + file + ": " + std::to_string(input.mesh.triangle_count()) +
-                             " triangles, " + std::to_string(active_voxels) + " voxels of " +
-                             text(input.voxel_size) + ", " + voxelizer + ", " + seconds_text(seconds));
+  print_summary(session, "voxelized " + file + ": " + std::to_string(mesh.triangle_count()) + " triangles, " +
+                             std::to_string(facts.voxels) + " voxels of " + text(facts.voxel_size) + ", " +
+                             voxelizer + ", " + seconds_text(facts.seconds));
 }
 
 void print_extracted(Session& session, const PolygonMesh& mesh, const std::string& extractor,
@@ -200,13 +177,12 @@ void print_extracted(Session& session, const PolygonMesh& mesh, const std::strin
                              seconds_text(seconds));
 }
 
-void note_thin_parts(const std::optional<ThinParts>& thin, double voxel_size, Session& session) {
+void report_thin_parts(const std::optional<ThinParts>& thin, Session& session) {
   const ThinParts parts = thin.value_or(ThinParts{.area = 1.0});
   made(session, "thickened_share", parts.thickened_area / parts.area);
   made(session, "thickened_by", parts.thickest);
   made(session, "thinnest_wall", parts.thinnest_wall);
   made(session, "merged_share", parts.merged_area / parts.area);
-  if (thin) session.context.note(thin_note(*thin, voxel_size));
 }
 
 void write_output(const std::string& path, const PolygonMesh& mesh, Session& session) {

@@ -5,7 +5,6 @@
 #include <string>
 #include <vector>
 
-#include "algorithms/remesh/thin_parts.h"
 #include "experiments/cli/session.h"
 #include "experiments/pipeline.h"
 
@@ -33,10 +32,10 @@ struct VoxelizeArguments {
   /// Returns the requested treatment of thin parts, or to keep them if possible. @throws UsageError if they
   /// cannot be preserved although that was requested.
   ThinRule thin_rule(double isovalue = 0.0) const;
-  /// Returns the input of the voxelizer, with the voxel size in world units.
+  /// Returns the parameters of the voxelizer, with the voxel size in world units.
   /// @throws Error if the mesh of `file` is smaller than a voxel, or if it has no extent and a resolution was
   /// requested.
-  VoxelizeRecipe recipe(const PolygonMesh& mesh, const std::string& file) const;
+  VoxelizeRecipe recipe(const PolygonMesh& mesh, const std::string& file, double isovalue = 0.0) const;
 };
 
 struct ExtractorArguments {
@@ -59,21 +58,15 @@ PolygonMesh read_polygons(const std::string& path, Session& session, const ReadO
 /// Returns the polygons of a file that was read from `path`, as read_polygons() does.
 PolygonMesh polygons_of(MeshFile&& file, const std::string& path, const Session& session);
 
-/// Voxelizes the mesh of `file` and prints a line of summary. @throws Error as the voxelizer and
-/// VoxelizeArguments::recipe().
-LevelSet voxelize(const PolygonMesh& mesh, const std::string& file, const VoxelizeArguments& arguments,
-                  Session& session);
-/// Voxelizes the mesh of `file` and samples its polygons; treats thin parts by thin_rule() and notes the
-/// thickened ones.
-PolygonSolid sample_polygons(const PolygonMesh& mesh, const std::string& file,
-                             const VoxelizeArguments& arguments, Session& session);
+/// Converts polygons to a solid (make_solid()), with a line of summary. @param name of the mesh
+MadeSolid make_solid(const PolygonMesh& mesh, const std::string& name, const VoxelizeArguments& arguments,
+                     Session& session);
 
-void print_voxelized(Session& session, const std::string& file, const VoxelizationInput& input,
-                     std::size_t active_voxels, const std::string& voxelizer, double seconds);
+void print_voxelized(Session& session, const std::string& file, const PolygonMesh& mesh,
+                     const VoxelizationFacts& facts, const std::string& voxelizer);
 void print_extracted(Session& session, const PolygonMesh& mesh, const std::string& extractor, double seconds);
-
-/// Notes which parts of the polygons were thickened; none if `thin` is empty.
-void note_thin_parts(const std::optional<ThinParts>& thin, double voxel_size, Session& session);
+/// Adds statistics of thickened parts, zeros if there are none, to the JSON document.
+void report_thin_parts(const std::optional<ThinParts>& thin, Session& session);
 
 /// Writes the mesh, with the unit of its coordinates if --units is given and the format stores one.
 void write_output(const std::string& path, const PolygonMesh& mesh, Session& session);

@@ -6,7 +6,6 @@
 #include <memory>
 #include <sstream>
 
-#include "algorithms/core/disjoint_sets.h"
 #include "algorithms/core/run_context.h"
 #include "algorithms/extraction/adaptivity_field.h"
 #include "algorithms/extraction/explain.h"
@@ -123,39 +122,13 @@ std::optional<AdaptivityField> read_adaptivity(const ConvertArguments& arguments
 
 // ---- Extraction.
 
-/// Returns the volume's mesh by the chosen extractor. `hermite` without `source` is that of a thickened
-/// solid.
-PolygonMesh extract(const ConvertArguments& arguments, const LevelSet& level_set, const PolygonMesh* source,
-                    const FloatHermite* hermite, Session& session) {
-  const std::optional<AdaptivityField> field = read_adaptivity(arguments, session);
-  const std::string& input = arguments.paths.in;
-  const ChosenExtractor& chosen = arguments.extracting.chosen;
-  check_written_precision(arguments.paths.out, level_set);
-  Stopwatch watch;
-  // A thickened solid has no ends of the data.
-  const bool thickened = hermite && !source;
-  const Ends treatment = arguments.ends == "open" ? Ends::open : Ends::closed;
-  EndedMesh ended = about_file(input, [&] {
-    return hermesh::extract(level_set, source,
-                            {.chosen = chosen,
-                             .isovalue = arguments.isovalue,
-                             .ends = thickened ? std::nullopt : std::optional(treatment),
-                             .field = field ? &*field : nullptr,
-                             .hermite = hermite,
-                             .written_in_single = is_written_in_single(arguments.paths.out)},
-                            session.context);
-  });
-  PolygonMesh mesh = std::move(ended.mesh);
-  session.context.check();
-  // No reader accepts a mesh file without polygons, ours included.
-  if (mesh.empty() && field && field->outside == AdaptivityField::Outside::nothing)
-    throw Error("'" + input + "': there is no surface inside the mask, nothing was written");
-  if (mesh.empty())
-    throw Error("'" + input +
-                "': " + no_surface(level_set, arguments.isovalue, source || hermite, chosen.extractor.name));
-  if (const std::string note = ends_note(ended.ends, treatment); !note.empty()) session.context.note(note);
-  print_extracted(session, mesh, chosen.extractor.name, watch.seconds());
-  return mesh;
+/// Returns the parameters of the extraction. `field` must outlive it.
+ExtractRecipe extract_recipe(const ConvertArguments& arguments, const std::optional<AdaptivityField>& field) {
+  return {.chosen = arguments.extracting.chosen,
+          .isovalue = arguments.isovalue,
+          .ends = arguments.ends == "open" ? Ends::open : Ends::closed,
+          .field = field ? &*field : nullptr,
+          .out = arguments.paths.out};
 }
 
 /// Writes the mesh; a signal that comes later has no effect.
@@ -197,7 +170,13 @@ int run_extract(ConvertArguments& arguments, Session& session) {
     source = read_polygons(arguments.source, session);
   }
   const LevelSet level_set = read_level_set(arguments.paths.in, arguments.grid, session.context);
-  PolygonMesh mesh = extract(arguments, level_set, source ? &*source : nullptr, nullptr, session);
+  const std::optional<AdaptivityField> field = read_adaptivity(arguments, session);
+  Stopwatch watch;
+  PolygonMesh mesh = about_file(arguments.paths.in, [&] {
+    return extract_surface(level_set, source ? &*source : nullptr, extract_recipe(arguments, field),
+                           session.context);
+  });
+  print_extracted(session, mesh, arguments.extracting.chosen.extractor.name, watch.seconds());
   if (!attributes.empty()) {
     std::string line = "attributes";
     for (const std::string& name : sample_attributes(mesh, arguments.paths.in, attributes, session.context))
@@ -208,47 +187,6 @@ int run_extract(ConvertArguments& arguments, Session& session) {
 }
 
 // ---- Remeshing at a voxel size.
-
-/// Returns the mesh of all of the polygons, with thin parts thickened.
-PolygonMesh remesh_all(const ConvertArguments& arguments, const PolygonMesh& mesh, Session& session) {
-  const PolygonSolid made = sample_polygons(mesh, arguments.paths.in, arguments.voxelizing, session);
-  const Options& options = arguments.extracting.chosen.options;
-  const bool exact_crossings = options.is("crossings", "exact");
-  if (made.thin && exact_crossings)
-    throw UsageError(
-        "-o crossings=exact takes crossings from the polygons, but thickened parts are not on them; use "
-        "--thin drop");
-  if (!made.thin && (options.is("hermite", "auto") || options.is("hermite", "exact") || exact_crossings))
-    if (const std::string note = missed_edges_note(made.solid.sampling); !note.empty())
-      session.context.note(note);
-  return extract(arguments, made.solid.level_set, made.thin ? nullptr : &mesh, &made.solid.hermite, session);
-}
-
-/// Returns the number of sets of polygons that are connected by shared vertices.
-std::size_t count_components(const PolygonMesh& mesh) {
-  DisjointSets sets(mesh.points.size());
-  std::vector<bool> used(mesh.points.size());
-  const auto join = [&](const auto& polygons) {
-    for (const auto& polygon : polygons)
-      for (const std::uint32_t corner : polygon) used[corner] = true, sets.join(polygon[0], corner);
-  };
-  join(mesh.triangles);
-  join(mesh.quads);
-  std::size_t count = 0;
-  for (std::uint32_t i = 0; i < sets.size(); ++i) count += used[i] && sets.find(i) == i;
-  return count;
-}
-
-/// Notes that a mesh has many more components than the polygons that it was made from, in linear time and
-/// memory. A few more are expected, because intersecting polygons are one solid or several.
-void note_components(const PolygonMesh& polygons, const PolygonMesh& mesh, Session& session) {
-  const std::size_t before = count_components(polygons), after = count_components(mesh);
-  if (after < 2 * before + 8) return;
-  session.context.note(
-      "the mesh has " + std::to_string(after) + " components and the polygons have " +
-      std::to_string(before) +
-      ": gaps and walls that are about as thin as a voxel came apart; smaller voxels mostly leave fewer");
-}
 
 /// Measures and notes the share of the visible surface of the polygons that the mesh does not show
 /// (validation/visible_loss.h). Returns true if it is at most `max_loss`. @param voxel_size world units
@@ -302,19 +240,21 @@ int run_remesh(ConvertArguments& arguments, Session& session) {
   const ThinRule rule = voxelizing.thin_rule(arguments.isovalue);
   // The default limit holds for losses that the user requested.
   const double max_loss = most_loss(arguments.max_loss, voxelizing.thin ? rule : ThinRule::keep);
+  const std::optional<AdaptivityField> field = read_adaptivity(arguments, session);
   const PolygonMesh mesh = read_polygons(paths.in, session);
-  const PolygonMesh made =
-      rule == ThinRule::drop
-          ? extract(arguments, voxelize(mesh, paths.in, voxelizing, session), &mesh, nullptr, session)
-          : remesh_all(arguments, mesh, session);
-  note_components(mesh, made, session);
+  const Remeshed made = about_file(paths.in, [&] {
+    return remesh(mesh, voxelizing.recipe(mesh, paths.in, arguments.isovalue),
+                  extract_recipe(arguments, field), session.context);
+  });
+  print_voxelized(session, paths.in, mesh, made, voxelizing.chosen.voxelizer.name);
+  if (rule != ThinRule::drop) report_thin_parts(made.thin, session);
+  print_extracted(session, made.mesh, arguments.extracting.chosen.extractor.name, made.extract_seconds);
   // Other isovalues, and parts outside a mask, do not show the polygons by intention.
   const bool is_of_polygons = arguments.isovalue == 0.0 && arguments.mask.empty() &&
                               arguments.frustum.empty() && !voxelizing.chosen.options.is("signs", "unsigned");
   const bool shows =
-      !is_of_polygons ||
-      check_visible_loss(mesh, made, *voxelizing.recipe(mesh, paths.in).voxel_size, max_loss, session);
-  return save(arguments, made, session, shows ? kDone : kNotMet);
+      !is_of_polygons || check_visible_loss(mesh, made.mesh, made.voxel_size, max_loss, session);
+  return save(arguments, made.mesh, session, shows ? kDone : kNotMet);
 }
 
 // ---- Remeshing within a bound.
@@ -395,13 +335,14 @@ int run_bounded(const ConvertArguments& arguments, const CLI::App& command, Sess
   if (made.free_area > 0.0) session.context.figure("area_that_bounds_nothing", made.free_area);
   if (made.hole_area > 0.0) session.context.figure("hole_area", made.hole_area);
   for (const std::string& note : notes(made)) session.context.note(note);
-  note_thin_parts(made.thin, made.voxel_size, session);
+  if (made.thin) session.context.note(thin_note(*made.thin, made.voxel_size));
+  report_thin_parts(made.thin, session);
   print_extracted(session, made.mesh, "voxels of " + text(made.voxel_size), watch.seconds());
   const double bound = std::max(made.to_surface, made.from_surface);
   print_summary(session, "certified: the mesh is within " + text(made.to_surface) +
                              " of the polygons' solid, and the solid within " + text(made.from_surface) +
                              " of the mesh (" + text(100.0 * bound / diagonal) + "% of the diagonal)");
-  note_components(mesh, made.mesh, session);
+  note_components(mesh, made.mesh, session.context);
   return save(arguments, made.mesh, session);
 }
 

@@ -68,7 +68,7 @@ FractureObject read_object(FractureArguments& arguments, std::optional<PolygonMe
   arguments.voxelizing.choose();
   source = read_polygons(arguments.paths.in, session, {.attributes = true});
   object.source = &*source;
-  PolygonSolid made = sample_polygons(*source, arguments.paths.in, arguments.voxelizing, session);
+  MadeSolid made = make_solid(*source, arguments.paths.in, arguments.voxelizing, session);
   object.level_set = std::move(made.solid.level_set);
   object.hermite = arguments.hermite == "level-set" ? sample_level_set(object.level_set, 0.0, session.context)
                                                     : std::move(made.solid.hermite);

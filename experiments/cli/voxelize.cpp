@@ -70,8 +70,9 @@ void keep_thin_parts(VolumeOutputs& outputs, const VolumeRequest& request, const
   const auto distances = openvdb::gridPtrCast<openvdb::FloatGrid>(*grid);
   const double voxel_size = distances->voxelSize().x();
   PolygonSolid made = solid_of(mesh, make_level_set(distances), rule, session.context);
-  note_thin_parts(made.thin, voxel_size, session);
+  report_thin_parts(made.thin, session);
   if (!made.thin) return;
+  session.context.note(thin_note(*made.thin, voxel_size));
   *grid = made.solid.level_set.grid().grid->deepCopy();
   if (outputs.hermite) outputs.hermite = std::move(made.solid.hermite);
   if (outputs.grids.size() > 1)
@@ -109,7 +110,8 @@ void write_outputs(const VoxelizeCommand& arguments, VolumeRequest request, Sess
     session.result["grids"].push_back(grid->getName());
     names += (names.empty() ? "" : ", ") + grid->getName();
   }
-  print_voxelized(session, paths.in, input, outputs.active_voxels, voxelizer.name, watch.seconds());
+  print_voxelized(session, paths.in, mesh, {outputs.active_voxels, input.voxel_size, watch.seconds()},
+                  voxelizer.name);
   for (const openvdb::GridBase::Ptr& grid : outputs.grids)
     if (rule == ThinRule::drop && grid->getName() == "sdf")
       note_lost_surface(mesh, make_level_set(openvdb::gridPtrCast<openvdb::FloatGrid>(grid)), voxelizer,
@@ -134,7 +136,11 @@ int run_voxelize(VoxelizeCommand& arguments, Session& session) {
     write_outputs(arguments, request, session);
   } else {
     const PolygonMesh mesh = read_polygons(paths.in, session);
-    write_level_set(paths.out, voxelize(mesh, paths.in, arguments.voxelizing, session), session.context);
+    const VoxelizeRecipe recipe = arguments.voxelizing.recipe(mesh, paths.in);
+    const MadeLevelSet made =
+        about_file(paths.in, [&] { return make_level_set(mesh, recipe, session.context); });
+    print_voxelized(session, paths.in, mesh, made, recipe.chosen.voxelizer.name);
+    write_level_set(paths.out, made.level_set, session.context);
   }
   work_is_finished();
   return kDone;

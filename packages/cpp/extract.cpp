@@ -6,11 +6,9 @@
 #include "algorithms/extraction/adaptivity_field.h"
 #include "algorithms/extraction/explain.h"
 #include "algorithms/extraction/frustum.h"
-#include "algorithms/extraction/volume_ends.h"
 #include "algorithms/hermite/solids.h"
 #include "algorithms/lattice/placement.h"
 #include "algorithms/remesh/bounded_remesh.h"
-#include "algorithms/remesh/thin_parts.h"
 #include "algorithms/variants.h"
 #include "packages/cpp/inside.h"
 
@@ -31,20 +29,12 @@ std::vector<MethodInfo> extractors() {
 
 namespace {
 
-struct ChosenExtractor {
-  const Extractor& extractor;
-  hermesh::Options options;
-  Ends ends;
-};
-
 ChosenExtractor choose(const ExtractOptions& options, const std::string& fallback) {
-  const Extractor& extractor =
-      find_variant(our_extractors(), options.extractor.empty() ? fallback : options.extractor);
   require(std::isfinite(options.isovalue), "the isovalue must be a finite number");
   require(options.ends == "closed" || options.ends == "open",
           "ends are closed or open, not '" + options.ends + "'");
-  return {extractor, hermesh::Options(extractor.name, extractor.options, options.options),
-          options.ends == "open" ? Ends::open : Ends::closed};
+  return hermesh::choose(our_extractors(), options.extractor.empty() ? fallback : options.extractor,
+                         options.options);
 }
 
 Eigen::Vector3d vector(const std::array<double, 3>& v) { return {v[0], v[1], v[2]}; }
@@ -84,42 +74,31 @@ std::optional<AdaptivityField> field_of(const ExtractOptions& options, const Ext
   return field;
 }
 
-PolygonMesh mesh_of(const LevelSet& level_set, const PolygonMesh* source, bool of_polygons,
-                    const ChosenExtractor& chosen, const ExtractOptions& options, RunContext& context) {
-  const std::optional<AdaptivityField> field = field_of(options, chosen.extractor, context);
-  EndedMesh ended = extract_with_ends(chosen.extractor,
-                                      {.level_set = level_set,
-                                       .isovalue = options.isovalue,
-                                       .source = source,
-                                       .options = chosen.options,
-                                       .context = context,
-                                       .field = field ? &*field : nullptr,
-                                       .written_in_single = options.written_in_single},
-                                      chosen.ends);
-  context.check();
-  require(!ended.mesh.empty() || !field || field->outside != AdaptivityField::Outside::nothing,
-          "there is no surface inside the mask, nothing was written");
-  if (ended.mesh.empty())
-    throw hermesh::Error(no_surface(level_set, options.isovalue, of_polygons, chosen.extractor.name));
-  if (const std::string note = ends_note(ended.ends, chosen.ends); !note.empty()) context.note(note);
-  return std::move(ended.mesh);
-}
+/// Parameters of an extraction, with the field that they point to.
+struct Extraction {
+  std::optional<AdaptivityField> field;
+  ExtractRecipe recipe;
 
-PolygonMesh contour(const LevelSet& level_set, const FloatHermite& hermite, const ChosenExtractor& chosen,
-                    const ExtractOptions& options, RunContext& context) {
+  Extraction(const ExtractOptions& options, const ChosenExtractor& chosen, RunContext& context)
+      : field(field_of(options, chosen.extractor, context)),
+        recipe{.chosen = chosen,
+               .isovalue = options.isovalue,
+               .ends = options.ends == "open" ? Ends::open : Ends::closed,
+               .field = field ? &*field : nullptr,
+               .written_in_single = options.written_in_single} {}
+  Extraction(const Extraction&) = delete;
+};
+
+/// Returns the surface of a solid.
+PolygonMesh surface_of(const LevelSet& level_set, const FloatHermite& hermite, const ChosenExtractor& chosen,
+                       const ExtractOptions& options, RunContext& context) {
   // A solid has no end of the data, and values only for the surface at 0.
   require(options.isovalue == 0.0, "the surface of a solid is at the isovalue 0");
   require(options.ends == "closed", "the surface of a solid has no end of the data that could be open");
-  const std::optional<AdaptivityField> field = field_of(options, chosen.extractor, context);
-  PolygonMesh mesh = chosen.extractor.extract({.level_set = level_set,
-                                               .options = chosen.options,
-                                               .context = context,
-                                               .field = field ? &*field : nullptr,
-                                               .hermite = &hermite,
-                                               .written_in_single = options.written_in_single});
-  context.check();
-  require(!mesh.empty(), "the solid has no surface, nothing was written");
-  return mesh;
+  Extraction extraction(options, chosen, context);
+  extraction.recipe.ends.reset();
+  extraction.recipe.hermite = &hermite;
+  return extract_surface(level_set, nullptr, extraction.recipe, context);
 }
 
 SignRule sign_rule(const std::string& signs) {
@@ -145,7 +124,8 @@ Mesh extract(const Volume& volume, const ExtractOptions& options, Context& conte
       check_source_has_effect(chosen.extractor, chosen.options, options.isovalue);
       polygons = &Inside::sampled(*source, copy);
     }
-    return Inside::mesh(mesh_of(Inside::level_set(volume), polygons, false, chosen, options, inner));
+    const Extraction extraction(options, chosen, inner);
+    return Inside::mesh(extract_surface(Inside::level_set(volume), polygons, extraction.recipe, inner));
   });
 }
 
@@ -153,28 +133,44 @@ Mesh extract(const Solid& solid, const ExtractOptions& options, Context& context
   return run(context, [&](RunContext& inner) {
     const ChosenExtractor chosen = choose(options, kOfVolumes);
     const auto& data = Inside::data(solid);
-    return Inside::mesh(contour(Inside::level_set(data.level_set), data.hermite, chosen, options, inner));
+    return Inside::mesh(surface_of(Inside::level_set(data.level_set), data.hermite, chosen, options, inner));
   });
+}
+
+VoxelizeRecipe recipe_of(const PolygonMesh& mesh, const VoxelizeOptions& options, double isovalue) {
+  require(!options.like, "only voxelize takes the lattice of another volume");
+  VoxelizeOptions given = options;
+  if (options.thin.value_or(Thin::keep) == Thin::keep)
+    given.options = with_open_sheets(options.voxelizer, options.options);
+  VoxelizeRecipe recipe{.chosen = choose(given),
+                        .voxel_size = voxel_size_of(mesh, options),
+                        .exterior_band = options.exterior_band,
+                        .interior_band = options.interior_band};
+  const char* reason = reason_to_drop_thin_parts(recipe.chosen, isovalue);
+  require(!reason || options.thin.value_or(Thin::drop) == Thin::drop,
+          std::string("thin parts can only be dropped: ") + (reason ? reason : ""));
+  static_assert(int(Thin::keep) == int(ThinRule::keep) && int(Thin::drop) == int(ThinRule::drop) &&
+                int(Thin::refuse) == int(ThinRule::refuse));
+  recipe.thin = reason ? ThinRule::drop : static_cast<ThinRule>(options.thin.value_or(Thin::keep));
+  return recipe;
 }
 
 Mesh remesh(const Mesh& mesh, const VoxelizeOptions& voxelizing, const ExtractOptions& extracting,
             Context& context) {
   return run(context, [&](RunContext& inner) {
-    const ChosenVoxelizer voxelizer = choose(voxelizing);
     const ChosenExtractor extractor = choose(extracting, kOfPolygons);
     PolygonMesh copy;
     const PolygonMesh& polygons = Inside::sampled(mesh, copy);
-    const double voxel_size = voxel_size_of(polygons, voxelizing);
-    const LevelSet level_set = level_set_of(polygons, voxel_size, voxelizing, voxelizer, inner);
-    return Inside::mesh(mesh_of(level_set, &polygons, true, extractor, extracting, inner));
+    const VoxelizeRecipe recipe = recipe_of(polygons, voxelizing, extracting.isovalue);
+    const Extraction extraction(extracting, extractor, inner);
+    return Inside::mesh(hermesh::remesh(polygons, recipe, extraction.recipe, inner).mesh);
   });
 }
 
 Mesh combine(Boolean operation, const Mesh& a, const Mesh& b, const VoxelizeOptions& voxelizing,
              const ExtractOptions& extracting, Context& context) {
   return run(context, [&](RunContext& inner) {
-    const ChosenVoxelizer voxelizer = choose(voxelizing);
-    require(!voxelizer.options.is("signs", "unsigned"),
+    require(!choose(voxelizing).options.is("signs", "unsigned"),
             "the option signs=unsigned leaves the solids without an inside to combine");
     const ChosenExtractor extractor = choose(extracting, kOfPolygons);
     PolygonMesh copy_of_a, copy_of_b;
@@ -182,13 +178,10 @@ Mesh combine(Boolean operation, const Mesh& a, const Mesh& b, const VoxelizeOpti
     const PolygonMesh& second = Inside::sampled(b, copy_of_b);
     // A resolution counts along the longer operand, so the order of the two does not matter.
     const bool second_is_longer = bounds(second).size().maxCoeff() > bounds(first).size().maxCoeff();
-    const SharedLattice lattice =
-        shared_lattice(first, second, voxel_size_of(second_is_longer ? second : first, voxelizing));
+    const VoxelizeRecipe recipe = recipe_of(second_is_longer ? second : first, voxelizing);
+    const SharedLattice lattice = shared_lattice(first, second, *recipe.voxel_size);
     const auto sampled = [&](const PolygonMesh& mesh, const std::string& name) {
-      const auto sample = [&](const PolygonMesh& framed) {
-        const LevelSet level_set = level_set_of(framed, lattice.voxel_size, voxelizing, voxelizer, inner);
-        return solid_of(framed, level_set, ThinRule::drop, inner).solid;
-      };
+      const auto sample = [&](const PolygonMesh& framed) { return make_solid(framed, recipe, inner).solid; };
       SampledSolid solid = about_file(name, [&] { return sample_solid(mesh, lattice, sample); });
       if (const std::string note = missed_edges_note(solid.sampling); !note.empty())
         inner.note(name + ": " + note);
@@ -207,7 +200,7 @@ Mesh combine(Boolean operation, const Mesh& a, const Mesh& b, const VoxelizeOpti
     require(!is_empty,
             "the result is empty, nothing was written: no sample and no edge of the lattice lies in it");
     if (lost.edges > 0) inner.note(note);
-    return Inside::mesh(contour(result.level_set, result.hermite, extractor, extracting, inner));
+    return Inside::mesh(surface_of(result.level_set, result.hermite, extractor, extracting, inner));
   });
 }
 
@@ -220,13 +213,15 @@ BoundedRemesh remesh_within(const Mesh& mesh, const BoundOptions& options, Conte
                                      .over_holes = options.over_holes,
                                      .most_points = options.most_points,
                                      .smallest_voxel = options.smallest_voxel,
-                                     .written_in_single = options.written_in_single};
+                                     .written_in_single = options.written_in_single,
+                                     .thin = options.thin == Thin::keep ? ThinRule::keep : ThinRule::drop};
     PolygonMesh copy;
     const PolygonMesh& polygons = Inside::sampled(mesh, copy);
     BoundedMesh made = options.triangles ? remesh_to_budget(polygons, *options.triangles, given, inner)
                                          : bounded_remesh(polygons, given, inner);
     if (!made.unmet.empty()) throw hermesh::Error(explanation(made));
     for (const std::string& note : notes(made)) inner.note(note);
+    if (made.thin) inner.note(thin_note(*made.thin, made.voxel_size));
     return BoundedRemesh{.mesh = Inside::mesh(std::move(made.mesh)),
                          .error = made.error,
                          .to_polygons = made.to_surface,

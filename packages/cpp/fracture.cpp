@@ -126,14 +126,12 @@ Fracture fracture(const Mesh& mesh, const VoxelizeOptions& voxelizing, const Fra
                   Context& context) {
   return run(context, [&](RunContext& inner) {
     check(options);
-    const ChosenVoxelizer voxelizer = choose(voxelizing);
     PolygonMesh copy;
     const PolygonMesh& polygons = Inside::sampled(mesh, copy);
-    const LevelSet level_set =
-        level_set_of(polygons, voxel_size_of(polygons, voxelizing), voxelizing, voxelizer, inner);
+    const MadeSolid made = make_solid(polygons, recipe_of(polygons, voxelizing), inner);
     const FloatHermite hermite = options.hermite == "level-set"
-                                     ? sample_level_set(level_set, 0.0, inner)
-                                     : sample_polygons(level_set, 0.0, polygons, inner);
+                                     ? sample_level_set(made.solid.level_set, 0.0, inner)
+                                     : made.solid.hermite;
     return broken(hermite, &polygons, options, inner);
   });
 }

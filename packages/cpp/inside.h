@@ -20,6 +20,7 @@
 #include "algorithms/core/variant.h"
 #include "algorithms/hermite/boolean_rule.h"
 #include "algorithms/hermite/sparse_hermite.h"
+#include "algorithms/remesh/remesh.h"
 #include "hermesh/hermite.h"
 #include "hermesh/voxelize.h"
 
@@ -148,12 +149,7 @@ HERMESH_INNER inline hermesh::Boolean inner_boolean(Boolean operation) {
 HERMESH_INNER MethodInfo method_info(const std::string& name, const std::string& summary,
                                      const std::vector<OptionSpec>& options);
 
-/// A voxelizer with its checked options.
-struct HERMESH_INNER ChosenVoxelizer {
-  const Voxelizer& voxelizer;
-  hermesh::Options options;
-};
-/// @throws hermesh::Error for an unknown name, option or value.
+/// @throws hermesh::Error for an unknown name, option or value, or an invalid band.
 HERMESH_INNER ChosenVoxelizer choose(const VoxelizeOptions& options);
 
 /// Returns the edge length of a voxel in world units. @throws hermesh::Error unless exactly one of
@@ -161,10 +157,9 @@ HERMESH_INNER ChosenVoxelizer choose(const VoxelizeOptions& options);
 /// extent.
 HERMESH_INNER double voxel_size_of(const PolygonMesh& mesh, const VoxelizeOptions& options);
 
-/// Voxelizes polygons after checking that they fit in memory, and notes lost surface. @throws hermesh::Error
-/// if `options` name the lattice of another volume, or as the voxelizer; hermesh::Cancelled
-HERMESH_INNER LevelSet level_set_of(const PolygonMesh& mesh, double voxel_size,
-                                    const VoxelizeOptions& options, const ChosenVoxelizer& chosen,
-                                    RunContext& context);
+/// Returns the parameters of make_solid() and remesh(). @throws hermesh::Error if `options` name the lattice
+/// of another volume, or thin parts cannot be kept although that was requested; as the two functions above
+HERMESH_INNER VoxelizeRecipe recipe_of(const PolygonMesh& mesh, const VoxelizeOptions& options,
+                                       double isovalue = 0.0);
 
 }  // namespace hermesh::v1

@@ -13,14 +13,18 @@
 
 namespace hermesh_tests {
 
-/// Returns the six faces of an axis-aligned cube of that side with its lowest corner there, as quads.
-inline hermesh::Mesh cube(double side, std::array<double, 3> lower = {0, 0, 0}) {
+/// Returns the six faces of an axis-aligned box of these sides with its lowest corner there, as quads.
+inline hermesh::Mesh box(std::array<double, 3> sides, std::array<double, 3> lower) {
   std::vector<double> points;
   for (int i = 0; i < 8; ++i)
-    for (int axis = 0; axis < 3; ++axis) points.push_back(lower[axis] + side * (i >> axis & 1));
+    for (int axis = 0; axis < 3; ++axis) points.push_back(lower[axis] + sides[axis] * (i >> axis & 1));
   const std::vector<std::uint32_t> quads = {0, 2, 3, 1, 4, 5, 7, 6, 0, 1, 5, 4,
                                             2, 6, 7, 3, 0, 4, 6, 2, 1, 3, 7, 5};
   return hermesh::Mesh(std::span<const double>(points), {}, quads);
+}
+
+inline hermesh::Mesh cube(double side, std::array<double, 3> lower = {0, 0, 0}) {
+  return box({side, side, side}, lower);
 }
 
 /// Returns a torus about the z axis, of triangles.

@@ -52,6 +52,33 @@ TEST_F(AsTheProgram, Remeshes) {
   expect_same("program.ply", "library.ply");
 }
 
+// A square plate of a twentieth of a voxel passes between the samples.
+TEST_F(AsTheProgram, KeepsThinParts) {
+  const Mesh plate = box({1.0, 1.0, 0.001}, {0.0, 0.0, 0.013});
+  hermesh::write_mesh(path("in.ply"), plate, context_);
+  const hermesh::VoxelizeOptions size = {.voxel_size = 0.02};
+  using hermesh::Thin;
+  program("remesh in.ply program.ply --voxel-size 0.02");
+  const Mesh made = hermesh::remesh(plate, size, {}, context_);
+  hermesh::write_mesh(path("library.ply"), made, context_);
+  expect_same("program.ply", "library.ply");
+  EXPECT_FALSE(context_.notes.empty()) << "a thickened plate is a note";
+
+  program("combine union in.ply in.ply program.ply --voxel-size 0.02");
+  const Mesh both = hermesh::combine(Boolean::union_of, plate, plate, size, {}, context_);
+  hermesh::write_mesh(path("library.ply"), both, context_);
+  expect_same("program.ply", "library.ply");
+
+  hermesh::VoxelizeOptions asked = size;
+  for (const Thin thin : {Thin::drop, Thin::refuse}) {
+    asked.thin = thin;
+    EXPECT_THROW(hermesh::remesh(plate, asked, {}, context_), Error);
+  }
+  asked.thin = Thin::keep;
+  EXPECT_THROW(hermesh::remesh(plate, asked, {.isovalue = 0.01}, context_), Error);
+  EXPECT_THROW(hermesh::voxelize(plate, asked, context_), Error);
+}
+
 TEST_F(AsTheProgram, RemeshesWithinAnError) {
   hermesh::write_mesh(path("in.ply"), torus(), context_);
   program("remesh in.ply program.ply --error 0.03");

@@ -44,22 +44,12 @@ double voxel_size_of(const PolygonMesh& mesh, const VoxelizeOptions& options) {
   return longest_side / static_cast<double>(*options.resolution);
 }
 
-LevelSet level_set_of(const PolygonMesh& mesh, double voxel_size, const VoxelizeOptions& options,
-                      const ChosenVoxelizer& chosen, RunContext& context) {
-  require(!options.like, "only voxelize takes the lattice of another volume");
-  check_voxelization_fits(mesh, voxel_size, options.exterior_band, options.interior_band);
-  LevelSet level_set = chosen.voxelizer.voxelize({.mesh = mesh,
-                                                  .voxel_size = voxel_size,
-                                                  .exterior_band = options.exterior_band,
-                                                  .interior_band = options.interior_band,
-                                                  .context = context,
-                                                  .options = chosen.options});
-  context.check();
-  note_lost_surface(mesh, level_set, chosen.voxelizer, context);
-  return level_set;
-}
-
 namespace {
+
+void refuse_thin_parts(const VoxelizeOptions& options) {
+  require(options.thin.value_or(Thin::drop) == Thin::drop,
+          "voxelize loses thin parts, with a note; remesh, combine and fracture keep them");
+}
 
 VolumeRequest requested(const std::string& grids, const VoxelizeOptions& options, bool fog_exterior) {
   VolumeRequest request = parse_volume_request(grids);
@@ -116,20 +106,33 @@ std::vector<Volume> volumes_of(const Mesh& mesh, const std::string& grids, const
 
 Volume voxelize(const Mesh& mesh, const VoxelizeOptions& options, Context& context) {
   return run(context, [&](RunContext& inner) {
+    refuse_thin_parts(options);
     // The lattice of another volume is for the voxelizer that makes all volumes.
     if (options.like || knows_triangles(options.voxelizer))
       return volumes_of(mesh, "sdf", options, false, inner).front();
     const ChosenVoxelizer chosen = choose(options);
     PolygonMesh copy;
     const PolygonMesh& polygons = Inside::sampled(mesh, copy);
-    return Inside::volume(level_set_of(polygons, voxel_size_of(polygons, options), options, chosen, inner));
+    const double voxel_size = voxel_size_of(polygons, options);
+    check_voxelization_fits(polygons, voxel_size, options.exterior_band, options.interior_band);
+    const LevelSet level_set = chosen.voxelizer.voxelize({.mesh = polygons,
+                                                          .voxel_size = voxel_size,
+                                                          .exterior_band = options.exterior_band,
+                                                          .interior_band = options.interior_band,
+                                                          .context = inner,
+                                                          .options = chosen.options});
+    inner.check();
+    note_lost_surface(polygons, level_set, chosen.voxelizer, inner);
+    return Inside::volume(level_set);
   });
 }
 
 std::vector<Volume> voxelize_grids(const Mesh& mesh, const std::string& grids, const VoxelizeOptions& options,
                                    Context& context, bool fog_exterior) {
-  return run(context,
-             [&](RunContext& inner) { return volumes_of(mesh, grids, options, fog_exterior, inner); });
+  return run(context, [&](RunContext& inner) {
+    refuse_thin_parts(options);
+    return volumes_of(mesh, grids, options, fog_exterior, inner);
+  });
 }
 
 }  // namespace hermesh::v1

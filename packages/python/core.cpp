@@ -350,6 +350,10 @@ void bind_options(py::module_& m) {
       .def_readonly("notes", &Watch::notes)
       .def_readonly("stage_seconds", &Watch::stage_seconds)
       .def_readonly("figures", &Watch::figures);
+  py::enum_<Thin>(m, "Thin")
+      .value("keep", Thin::keep)
+      .value("drop", Thin::drop)
+      .value("refuse", Thin::refuse);
   py::class_<VoxelizeOptions>(m, "VoxelizeOptions")
       .def(py::init<>())
       .def_readwrite("resolution", &VoxelizeOptions::resolution)
@@ -358,7 +362,8 @@ void bind_options(py::module_& m) {
       .def_readwrite("exterior_band", &VoxelizeOptions::exterior_band)
       .def_readwrite("interior_band", &VoxelizeOptions::interior_band)
       .def_readwrite("voxelizer", &VoxelizeOptions::voxelizer)
-      .def_readwrite("options", &VoxelizeOptions::options);
+      .def_readwrite("options", &VoxelizeOptions::options)
+      .def_readwrite("thin", &VoxelizeOptions::thin);
   py::class_<Frustum>(m, "Frustum", "The view of a camera: lengths in world units, the angle in degrees.")
       .def(py::init([](std::array<double, 3> position, std::array<double, 3> look_at,
                        std::array<double, 3> up, double angle, double aspect, double near,
@@ -511,7 +516,7 @@ void bind_functions(py::module_& m) {
   m.def("remesh_within",
         [](const Mesh& mesh, std::optional<double> error, std::optional<std::size_t> triangles,
            const std::string& signs, bool over_holes, double smallest_voxel, double limit_points,
-           bool written_in_single, Watch& watch) {
+           bool written_in_single, Thin thin, Watch& watch) {
           const BoundedRemesh made = watched(watch, [&](Context& context) {
             return remesh_within(mesh,
                                  {.error = error,
@@ -520,7 +525,8 @@ void bind_functions(py::module_& m) {
                                   .over_holes = over_holes,
                                   .smallest_voxel = smallest_voxel,
                                   .most_points = limit_points,
-                                  .written_in_single = written_in_single},
+                                  .written_in_single = written_in_single,
+                                  .thin = thin},
                                  context);
           });
           return py::make_tuple(made.mesh, made.error, made.to_polygons, made.from_polygons, made.voxel_size);

@@ -303,6 +303,12 @@ def _voxelizing(*, voxelizer: str, signs: str | None, voxelizer_options: Mapping
     return _filled(_core.VoxelizeOptions(), voxelizer=voxelizer, options=texts, **values)
 
 
+def _thin(rule: str | None) -> _core.Thin | None:
+    if rule not in (None, "keep", "drop", "refuse"):
+        raise Error(f"thin is keep, drop or refuse, not '{rule}'")
+    return rule and getattr(_core.Thin, rule)
+
+
 def _extracting(of_method: Mapping[str, OptionValue], /, **values: Any) -> _core.ExtractOptions:
     return _filled(_core.ExtractOptions(), options=_texts(of_method), **values)
 
@@ -388,6 +394,7 @@ def extract(volume: Volume, *, extractor: str = "dual-contouring", isovalue: flo
 def remesh(mesh: MeshLike, *, resolution: int | None = None, voxel_size: float | None = None,
            exterior_band: float = 3.0, interior_band: float = 3.0, voxelizer: str = "hermesh",
            signs: str | None = None, voxelizer_options: Mapping[str, OptionValue] | None = None,
+           thin: str | None = None,
            extractor: str = "manifold-dual-contouring", isovalue: float = 0.0, mask: Volume | None = None,
            frustum: Frustum | None = None, frustum_resolution: int = 84, outside: str = "simplify",
            tolerance_grid: Volume | None = None, written_in_single: bool = False,
@@ -398,10 +405,13 @@ def remesh(mesh: MeshLike, *, resolution: int | None = None, voxel_size: float |
 
     resolution or voxel_size (world units), bands, voxelizer: as in voxelize(), with the voxelizer's options
     in a dict. extractor and the others: as in extract().
+    thin: walls, wires and open sheets thinner than the voxels: "keep" thickens them until they appear, with a
+        note, "drop" loses them, with a note, and "refuse" raises Error; None keeps them where possible, i.e.
+        with the voxelizer hermesh, signs and the isovalue 0.
     """
     voxelizing = _voxelizing(resolution=resolution, voxel_size=voxel_size, exterior_band=exterior_band,
                              interior_band=interior_band, voxelizer=voxelizer, signs=signs,
-                             voxelizer_options=voxelizer_options)
+                             voxelizer_options=voxelizer_options, thin=_thin(thin))
     extracting = _extracting(options, extractor=extractor, isovalue=isovalue, mask=mask, frustum=frustum,
                              frustum_resolution=frustum_resolution, outside=outside,
                              tolerance_grid=tolerance_grid, written_in_single=written_in_single)
@@ -421,7 +431,7 @@ class BoundedRemesh(NamedTuple):
 
 def remesh_within(mesh: MeshLike, *, error: float | None = None, triangles: int | None = None,
                   signs: str = "winding-number", over_holes: bool = False, smallest_voxel: float = 0.0,
-                  limit_points: float = 3e7, written_in_single: bool = False,
+                  limit_points: float = 3e7, written_in_single: bool = False, thin: str = "keep",
                   progress: Progress | None = None, cancel: _IsSet | None = None, threads: int | None = None,
                   log: Log | None = None) -> BoundedRemesh:
     """Returns a mesh with a certified two-sided distance of at most `error` (world units) to the boundary of
@@ -430,18 +440,18 @@ def remesh_within(mesh: MeshLike, *, error: float | None = None, triangles: int 
 
     over_holes allows it to close holes where no polygon is near. smallest_voxel (world units, 0 for an eighth
     of the error) and limit_points limit the work; beyond them the function raises hermesh.Error with location
-    and reason.
+    and reason. thin is as in remesh(); with "drop" and "refuse" a part that is too thin is an error.
     """
     mesh = as_mesh(mesh)
     with _Watching(progress, cancel, threads, log) as watch:
         return BoundedRemesh(*_core.remesh_within(mesh, error, triangles, signs, over_holes, smallest_voxel,
-                                                  limit_points, written_in_single, watch))
+                                                  limit_points, written_in_single, _thin(thin), watch))
 
 
 def combine(operation: str, a: MeshLike, b: MeshLike, *, resolution: int | None = None,
             voxel_size: float | None = None, exterior_band: float = 3.0, interior_band: float = 3.0,
             voxelizer: str = "hermesh", signs: str | None = None,
-            voxelizer_options: Mapping[str, OptionValue] | None = None,
+            voxelizer_options: Mapping[str, OptionValue] | None = None, thin: str | None = None,
             extractor: str = "manifold-dual-contouring", written_in_single: bool = False,
             progress: Progress | None = None, cancel: _IsSet | None = None, threads: int | None = None,
             log: Log | None = None, **options: OptionValue) -> Mesh:
@@ -456,7 +466,7 @@ def combine(operation: str, a: MeshLike, b: MeshLike, *, resolution: int | None 
     """
     voxelizing = _voxelizing(resolution=resolution, voxel_size=voxel_size, exterior_band=exterior_band,
                              interior_band=interior_band, voxelizer=voxelizer, signs=signs,
-                             voxelizer_options=voxelizer_options)
+                             voxelizer_options=voxelizer_options, thin=_thin(thin))
     extracting = _extracting(options, extractor=extractor, written_in_single=written_in_single)
     first, second = as_mesh(a), as_mesh(b)
     with _Watching(progress, cancel, threads, log) as watch:
@@ -470,8 +480,9 @@ def fracture(solid: MeshLike | Volume, cutters: str | MeshLike | Sequence[MeshLi
              method: str = "labelled", tolerance: float = 0.0, rule: str = "printed",
              min_volume: float = 27.0, split: bool = True, hermite: str = "auto", exterior_band: float = 3.0,
              interior_band: float = 3.0, voxelizer: str = "hermesh", signs: str | None = None,
-             voxelizer_options: Mapping[str, OptionValue] | None = None, progress: Progress | None = None,
-             cancel: _IsSet | None = None, threads: int | None = None, log: Log | None = None) -> Fracture:
+             voxelizer_options: Mapping[str, OptionValue] | None = None, thin: str | None = None,
+             progress: Progress | None = None, cancel: _IsSet | None = None,
+             threads: int | None = None, log: Log | None = None) -> Fracture:
     """Breaks a solid, a mesh or a level set, into pieces that are closed and meet in shared triangles.
 
     cutters: "voronoi:N", "chunks:N" (Voronoi cells with rough walls), "planes:N", "planes:NX,NY,NZ,D;..."
@@ -490,7 +501,7 @@ def fracture(solid: MeshLike | Volume, cutters: str | MeshLike | Sequence[MeshLi
     min_volume: voxels: smaller pieces join a neighbour; 0 keeps all. split: True to split disconnected
         pieces.
     hermite: data of the solid: "auto", "exact" from polygons, or "level-set".
-    resolution or voxel_size, bands, voxelizer: as in remesh(); not for a level set, which already has voxels.
+    resolution or voxel_size, bands, voxelizer, thin: as in remesh(); not for a level set, which has voxels.
 
     Raises Error for unknown options, or a solid without an inside. Adds a note for each cutter without
     effect.
@@ -514,7 +525,7 @@ def fracture(solid: MeshLike | Volume, cutters: str | MeshLike | Sequence[MeshLi
             return _core.fracture_volume(solid, options, watch)
     voxelizing = _voxelizing(resolution=resolution, voxel_size=voxel_size, exterior_band=exterior_band,
                              interior_band=interior_band, voxelizer=voxelizer, signs=signs,
-                             voxelizer_options=voxelizer_options)
+                             voxelizer_options=voxelizer_options, thin=_thin(thin))
     mesh = as_mesh(solid, attributes=True)
     with _Watching(progress, cancel, threads, log) as watch:
         return _core.fracture(mesh, voxelizing, options, watch)

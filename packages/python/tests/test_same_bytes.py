@@ -60,6 +60,16 @@ class SameBytes(unittest.TestCase):
         with self.assertRaises(hermesh.Error):
             hermesh.remesh_within(self.torus)
 
+    def test_of_thin_parts(self):
+        plate = self.folder / "plate.ply"
+        points, quads = cube(1.0)
+        hermesh.write_mesh(plate, (points * [1, 1, 0.001] + [0, 0, 0.013], quads))
+        with self.assertWarns(hermesh.Note):
+            self.compare(hermesh.remesh(plate, voxel_size=0.02), ".ply", "remesh", plate, "--voxel-size", 0.02)
+        for thin in ["drop", "refuse", "lose"]:
+            with self.assertRaises(hermesh.Error):
+                hermesh.remesh(plate, voxel_size=0.02, thin=thin)
+
     def test_of_quads(self):
         self.compare(hermesh.remesh(cube(1.0, (0.5, 0, -0.5)), resolution=30, extractor="dual-contouring"),
                      ".ply", "remesh", self.cube, "--resolution", 30, "--extractor", "dual-contouring")

@@ -77,6 +77,7 @@ struct BoundOptions {
   double smallest_voxel = 0.0;           ///< world units; 0: an eighth of the error
   double most_points = 3e7;              ///< maximum number of vertices of the finest mesh
   bool written_in_single = false;        ///< as in ExtractOptions
+  Thin thin = Thin::keep;  ///< otherwise a part that the smallest voxels do not show is an error
 };
 
 /// A mesh with its certified distances, world units.

@@ -12,6 +12,13 @@
 
 namespace hermesh::HERMESH_V1 {
 
+/// Treatment of walls, wires and open sheets that are thinner than the voxels can show.
+enum class Thin {
+  keep,   ///< thickened until they show, with a note
+  drop,   ///< lost, with a note
+  refuse  ///< an error
+};
+
 /// Options of voxelize(), as of `hermesh voxelize`. Exactly one of resolution, voxel_size and like must be
 /// given.
 struct VoxelizeOptions {
@@ -22,6 +29,9 @@ struct VoxelizeOptions {
   double interior_band = 3.0;                   ///< width of the band inside, voxels, at least 1
   std::string voxelizer = "hermesh";            ///< one of voxelizers()
   Options options = {};                         ///< of the voxelizer, such as {"signs", "winding-number"}
+  /// Of remesh(), combine() and fracture(); none: keep where possible, i.e. with the voxelizer hermesh, signs
+  /// and the isovalue 0. voxelize() always drops thin parts.
+  std::optional<Thin> thin = {};
 };
 
 /// Returns the available voxelizers.
