@@ -45,8 +45,10 @@ std::pair<int, std::string> last_line_of(const std::string& command) {
 
 /// Runs fetch_data.sh. Returns the reason if there is no file afterwards, else "".
 std::string fetch(const CaseFile& file, RunContext& context) {
-  if (file.from.empty()) return "no package registry has it";
-  if (!environment("HERMESH_OFFLINE").empty()) return "HERMESH_OFFLINE is set";
+  if (file.from.empty()) return "it has no public source";
+  // The laboratory states here why its own download failed.
+  if (const std::string offline = environment("HERMESH_OFFLINE"); !offline.empty())
+    return offline == "1" ? "HERMESH_OFFLINE is set" : offline;
   // An unreachable registry takes long to fail, so each file is tried once.
   static std::map<std::string, std::string> failures;
   if (const auto known = failures.find(file.name); known != failures.end()) return known->second;
