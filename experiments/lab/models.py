@@ -47,9 +47,8 @@ def _package(file):
 
 
 def _is_available(name):
-    data = os.environ.get("HERMESH_DATA")
-    directories = [corpus.cache_root()] + [pathlib.Path(data)] * bool(data)
-    return any((directory / file["file"]).exists() for directory in directories for file in _files(name))
+    directories = filter(None, [os.environ.get("HERMESH_DATA"), corpus.cache_root()])
+    return any(pathlib.Path(directory, file["file"]).exists() for directory in directories for file in _files(name))
 
 
 def fetch(names, say):
