@@ -358,7 +358,7 @@ class Run:
 
         reason = models.fetch([group["case"]["name"] for group in groups if "case" in group], say)
         if reason:
-            os.environ["HERMESH_OFFLINE"] = reason
+            os.environ.setdefault("HERMESH_OFFLINE", reason)
 
     def _say_done(self, done, groups):
         """Prints a line for each finished group, unless a terminal shows the progress, and logs it."""

@@ -21,7 +21,8 @@ def catalogue():
 
 
 @functools.cache
-def _package_sizes():
+def package_sizes():
+    """Returns the bytes to download by kind and name of the package."""
     with open(EXPERIMENTS / "data/packages.tsv", newline="") as file:
         return {(row["kind"], row["package"]): int(row["bytes"]) for row in csv.DictReader(file, delimiter="\t")}
 
@@ -67,15 +68,16 @@ def fetch(names, say):
         if name not in private:
             file = next(file for file in _files(name) if "from" in file)
             wanted.setdefault(_package(file), file["file"])
-    if not wanted or os.environ.get("HERMESH_OFFLINE"):
+    if not wanted:
         return ""
-    sizes = {package: _package_sizes().get(package, 0) / 2**20 for package in wanted}
-    say(f"downloading {sum(sizes.values()):.0f} MiB to {corpus.cache_root()}: "
-        + ", ".join(f"{package[1]} ({size:.0f} MiB)" for package, size in sizes.items()))
-    reasons = [_fetch_file(file) for file in wanted.values()]
-    absent = [name for name in missing if name not in private and not _is_available(name)]
-    reason = "; ".join(filter(None, reasons))
-    if absent:
+    if os.environ.get("HERMESH_OFFLINE"):
+        reason = "HERMESH_OFFLINE is set"
+    else:
+        sizes = {package: package_sizes().get(package, 0) / 2**20 for package in wanted}
+        say(f"downloading {sum(sizes.values()):.0f} MiB to {corpus.cache_root()}: "
+            + ", ".join(f"{package[1]} ({size:.0f} MiB)" for package, size in sizes.items()))
+        reason = "; ".join(filter(None, map(_fetch_file, wanted.values())))
+    if absent := [name for name in missing if name not in private and not _is_available(name)]:
         say(f"{reason}; replaced by stand-ins of the same size: {', '.join(absent)}")
     return reason
 
