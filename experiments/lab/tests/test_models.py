@@ -85,7 +85,7 @@ class Fetches(unittest.TestCase):
             + case_of("scan", entry_of("scan.raw.gz", gzip_9n(SAMPLES), "deb parts inner.tar scan/matrix.dat"), more="volume = {}\n")
             + case_of("source", entry_of("source.off", TRIANGLE, "deb-src sources/trixie test/part.off"))
             + case_of("absent", entry_of("absent.off", TRIANGLE, "deb nothing absent.off"))
-            + case_of("private", entry_of("private.off", TRIANGLE))
+            + case_of("private", entry_of("private.off", TRIANGLE), more='stand_in = "part"\n')
             + '[[case]]\nname = "closed"\nsummary = "x"\nclose_holes_of = "private"\n'
             + '[[case]]\nname = "ball"\nsummary = "x"\nrecipe = "sphere"\n')
         (self.experiments / "data/packages.tsv").write_text(
@@ -162,13 +162,14 @@ class Fetches(unittest.TestCase):
         said = []
         reason = models.fetch(["a", "absent", "closed", "private"], said.append)
         self.assertEqual(reason, "apt could not get nothing")
-        self.assertIn("no public source", said[0])
-        self.assertIn(": closed, private; ", said[0])
-        self.assertEqual(said[2], "apt could not get nothing; replaced by stand-ins of the same size: absent")
+        self.assertIn("no public source, replaced by stand-ins: closed (part), private (part); ", said[0])
+        self.assertTrue(said[1].startswith("downloading 8 MiB"), said)
+        self.assertIn("part.off", self.cached())
+        self.assertEqual(said[2], "apt could not get nothing; replaced by stand-ins: absent")
         with mock.patch.dict(os.environ, HERMESH_OFFLINE="1"):
             said.clear()
             self.assertEqual(models.fetch(["absent"], said.append), "HERMESH_OFFLINE is set")
-            self.assertEqual(said, ["HERMESH_OFFLINE is set; replaced by stand-ins of the same size: absent"])
+            self.assertEqual(said, ["HERMESH_OFFLINE is set; replaced by stand-ins: absent"])
 
     def test_private_cases_are_marked(self):
         private = [case["name"] for case in listing.cases() if case["private"]]
