@@ -38,7 +38,7 @@ class CaseFileReader {
       check_keys(entry, {"name", "summary", "files", "triangles", "stand_in"});
       add_files(result, entry);
       result.triangles = number(*node(entry, "triangles"));
-      result.stand_in = recipe(entry, "stand_in");
+      result.stand_in = stand_in(entry);
     } else if (entry.contains("recipe")) {
       check_keys(entry, {"name", "summary", "recipe", "parameters", "sha256"});
       result.recipe = recipe(entry, "recipe");
@@ -88,6 +88,14 @@ class CaseFileReader {
   std::string recipe(const toml::table& entry, std::string_view key) {
     const std::string name = text(entry, key);
     if (!is_recipe(name)) fail(node(entry, key)->source(), "there is no recipe '" + name + "'");
+    return name;
+  }
+  std::string stand_in(const toml::table& entry) {
+    const std::string name = text(entry, "stand_in");
+    const auto other = std::ranges::find(cases_, name, &CaseRecipe::name);
+    if (!is_recipe(name) && (other == cases_.end() || other->files.empty() || other->is_volume))
+      fail(node(entry, "stand_in")->source(),
+           "'stand_in' must be a recipe or a case above it that has files, not '" + name + "'");
     return name;
   }
   std::array<double, 3> three(const toml::table& entry, std::string_view key) {

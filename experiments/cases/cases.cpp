@@ -45,8 +45,10 @@ std::pair<int, std::string> last_line_of(const std::string& command) {
 
 /// Runs fetch_data.sh. Returns the reason if there is no file afterwards, else "".
 std::string fetch(const CaseFile& file, RunContext& context) {
-  if (file.from.empty()) return "no package registry has it";
-  if (!environment("HERMESH_OFFLINE").empty()) return "HERMESH_OFFLINE is set";
+  if (file.from.empty()) return "it has no public source";
+  // The laboratory states here why its own download failed.
+  if (const std::string offline = environment("HERMESH_OFFLINE"); !offline.empty())
+    return offline == "1" ? "HERMESH_OFFLINE is set" : offline;
   // An unreachable registry takes long to fail, so each file is tried once.
   static std::map<std::string, std::string> failures;
   if (const auto known = failures.find(file.name); known != failures.end()) return known->second;
@@ -117,19 +119,29 @@ std::optional<LocatedFile> locate_files(const CaseRecipe& recipe, std::string& r
   return std::nullopt;
 }
 
-LoadedCase load_stand_in(const CaseRecipe& recipe, const std::string& reason, RunContext& context) {
+LoadedCase load_files(const std::vector<CaseRecipe>& all, const CaseRecipe& recipe, RunContext& context);
+
+LoadedCase load_stand_in(const std::vector<CaseRecipe>& all, const CaseRecipe& recipe,
+                         const std::string& reason, RunContext& context) {
   check_stand_in_allowed(recipe.name, reason);
+  if (!is_recipe(recipe.stand_in)) {
+    LoadedCase other = load_files(all, *std::ranges::find(all, recipe.stand_in, &CaseRecipe::name), context);
+    other.name = recipe.name;
+    if (!other.origin.starts_with("stand-in"))
+      other.origin = "stand-in: the case " + recipe.stand_in + ", because " + reason;
+    return other;
+  }
   PolygonMesh mesh = make_recipe(recipe.stand_in, {{"triangles", recipe.triangles}}, context);
   const std::string sha256 = sha256_of_mesh(mesh);
   return {recipe.name, std::move(mesh),
           "stand-in: " + recipe.stand_in + " of the same size, because " + reason, sha256};
 }
 
-LoadedCase load_files(const CaseRecipe& recipe, RunContext& context) {
+LoadedCase load_files(const std::vector<CaseRecipe>& all, const CaseRecipe& recipe, RunContext& context) {
   std::string reasons;
   if (const std::optional<LocatedFile> located = locate_files(recipe, reasons, context))
     return {recipe.name, read_polygons(located->path, context), located->origin, located->sha256};
-  return load_stand_in(recipe, reasons, context);
+  return load_stand_in(all, recipe, reasons, context);
 }
 
 LevelSet read_volume(const CaseRecipe& recipe, const std::filesystem::path& path, RunContext& context) {
@@ -153,7 +165,7 @@ LoadedCase generated(const CaseRecipe& recipe, const RecipeParameters& parameter
 
 LoadedCase load_recipe(const std::vector<CaseRecipe>& all, const CaseRecipe& recipe, RunContext& context) {
   if (recipe.is_volume) throw Error("the case " + recipe.name + " is a volume and has no polygons");
-  if (!recipe.files.empty()) return load_files(recipe, context);
+  if (!recipe.files.empty()) return load_files(all, recipe, context);
   LoadedCase result;
   if (recipe.change.empty()) {
     result = generated(recipe, recipe.parameters, context);

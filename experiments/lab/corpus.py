@@ -52,10 +52,14 @@ def sample(entries, count, seed):
     return [e for e in entries if e.sha256 in chosen]
 
 
+def cache_root():
+    """Returns the directory that holds everything downloaded."""
+    return pathlib.Path(os.environ.get("HERMESH_CACHE") or os.path.join(
+        os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache"), "hermesh"))
+
+
 def cache_directory():
-    base = os.environ.get("HERMESH_CACHE") or os.path.join(
-        os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache"), "hermesh")
-    return pathlib.Path(base) / "corpus"
+    return cache_root() / "corpus"
 
 
 def location(entry, cache):

@@ -22,7 +22,7 @@ import signal
 import sys
 import time
 
-from . import ablations, child, compare, experiment, merge, stale, tables, upkeep
+from . import ablations, child, compare, experiment, merge, models, stale, tables, upkeep
 from .child import DataMissing, InputUnreadable
 from .program import check_may_be_kept, load_program, provenance, sha256_of
 from .rows import LabError, append_rows, drop_torn_row, find, read_rows, readable, text_at, to_json
@@ -336,6 +336,7 @@ class Run:
                 self.out.mkdir(parents=True, exist_ok=True)
             if self.arguments.shard:
                 groups = self._own_groups(groups)
+            self._fetch_models(groups)
             self._read_existing()
             for done, group in enumerate(groups):
                 self.position = f"[{done + 1}/{len(groups)}] {group['name'][:-1]}"
@@ -348,6 +349,16 @@ class Run:
         finally:
             if not self.arguments.quiet:
                 sys.stderr.write("".join(f"note: {note}\n" for note in self.notes))
+
+    def _fetch_models(self, groups):
+        """Downloads the models of the groups in advance; if that fails, no child tries again."""
+        def say(message):
+            if not self.arguments.quiet:
+                print(f"hermesh: {message}", file=sys.stderr, flush=True)
+
+        reason = models.fetch([group["case"]["name"] for group in groups if "case" in group], say)
+        if reason:
+            os.environ.setdefault("HERMESH_OFFLINE", reason)
 
     def _say_done(self, done, groups):
         """Prints a line for each finished group, unless a terminal shows the progress, and logs it."""

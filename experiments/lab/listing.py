@@ -1,18 +1,15 @@
 """The command list: experiments and cases, which `hermesh list` appends to its variants."""
 
 import json
-import tomllib
 
-from . import experiment
-from .rows import ROOT
+from . import experiment, models
 
 
 def cases():
-    """Returns (name, summary, kind) of each case; its kind is file, generated or volume."""
-    document = tomllib.loads((ROOT / "experiments/cases.toml").read_text())
-    return [(case["name"], case["summary"],
-             "volume" if "volume" in case else "file" if "files" in case else "generated")
-            for case in document["case"]]
+    """Returns the name, summary, kind (file, generated or volume) and privacy of each case."""
+    return [{"name": name, "summary": case["summary"], "kind": models.kind_of(case),
+             "private": models.is_private(name)}
+            for name, case in models.catalogue().items()]
 
 
 def add_command(subparsers):
@@ -24,16 +21,15 @@ def add_command(subparsers):
 def run(arguments):
     experiments = experiment.list_experiments()
     if arguments.json:
-        keys = "name", "summary", "kind"
-        listed = {"experiments": experiments, "cases": [dict(zip(keys, case)) for case in cases()]}
-        print(json.dumps(listed, default=str))
+        print(json.dumps({"experiments": experiments, "cases": cases()}, default=str))
         return 0
     print("\nexperiments (hermesh run NAME), and the tables and figures of the thesis that they make")
     for each in experiments:
         print(f"  {each['name']:<23} {each['question']}")
         if each["shows"]:
             print(f"  {'':<23} also called {', '.join(each['shows'])}")
-    print("\ncases (inputs that experiments name)")
-    for name, summary, kind in cases():
-        print(f"  {name:<23} {summary} [{kind}]")
+    print("\ncases (inputs that experiments name); the files of a private case have no public source: without them in "
+          "$HERMESH_DATA, a stand-in of the same size replaces it")
+    for case in cases():
+        print(f"  {case['name']:<23} {case['summary']} [{case['kind']}{', private' * case['private']}]")
     return 0

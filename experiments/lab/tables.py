@@ -8,7 +8,7 @@ import pathlib
 import re
 import sys
 
-from . import ablations, plots
+from . import ablations, models, plots
 from .database import RowDatabase
 from .rows import (ROOT, Column, all_columns, cell_text, find, latest_groups, number_at, own_columns,
                    read_rows, readable, text_at, to_json, value_of)
@@ -73,9 +73,14 @@ def group_facts(group):
     row = group.rows[0]
     if has(row, "/measurement"):
         parameters = text_at(row, "/measurement/parameters")
-        return [f"measured: {parameters} seed={text_at(row, '/measurement/seed')}", _run_fact(group)]
+        facts = [f"measured: {parameters} seed={text_at(row, '/measurement/seed')}", _run_fact(group)]
+        private = dict.fromkeys(given["name"] for each in group.rows for given in find(each, "/inputs") or []
+                                if models.is_private(given.get("name", "")))
+        return facts + [f"private inputs, without a public source: {', '.join(private)}"] * bool(private)
     origin, sha256 = text_at(row, "/case/origin"), text_at(row, "/case/sha256")[:12]
     fact = f"input: {origin}, sha256 {sha256}, {readable(number_at(row, '/case/triangles'))} triangles"
+    if models.is_private(text_at(row, "/case/name")):
+        fact += "; private: without a public source"
     if origin.startswith("stand-in"):
         fact = "STAND-IN DATA, not the original; " + fact
     facts = [fact, _grid_fact(row), _run_fact(group)]

@@ -22,12 +22,12 @@ NAMES = ("good good2 crashing hanging talking hungry forking leaving refusing ga
 DESCRIPTION = {
     "extractors": [{"name": name, "options": []} for name in NAMES],
     "voxelizers": [{"name": name, "options": []} for name in ("plain", "crashing")],
-    "cases": ["box", "block", "brick"], "commit": "0" * 40, "dirty": False, "build": {}, "libraries": {},
+    "cases": ["box", "beam", "brick"], "commit": "0" * 40, "dirty": False, "build": {}, "libraries": {},
     "threads": 2, "measurements": [{"name": "letters", "parameters": [],
                                     "tables": [{"name": "letters", "columns": ["value"]}]}]}
 PROGRAM = program.Program([sys.executable, "-S", str(TOY)], TOY, DESCRIPTION)
 LETTERS = 'kind = "measurement"\nmeasurement = "letters"\nquestion = "why?"\n[quick]\n'
-TWO_CASES = '{ name = "box", resolutions = [8, 9] }, { name = "block", resolutions = [8] }'
+TWO_CASES = '{ name = "box", resolutions = [8, 9] }, { name = "beam", resolutions = [8] }'
 
 
 def outcome(row):
@@ -188,7 +188,7 @@ class Resume(Runs):
 
     def test_unreadable_cases_fail_alone_and_are_run_again_when_they_can_be_read(self):
         mesh = self.root / "mesh.off"
-        self.write("good good2", TWO_CASES.replace("block", str(mesh)).replace(", 9", ""))
+        self.write("good good2", TWO_CASES.replace("beam", str(mesh)).replace(", 9", ""))
         for content, code, count in ((None, 1, 4), (None, 1, 4), ("OFF", 0, 6), ("other data", 0, 8)):
             if content:
                 mesh.write_text(content)
