@@ -1,0 +1,157 @@
+"""Shared by the adapters, which run other programs for `hermesh benchmark` (README.md, Adapters).
+
+An adapter is started with the path of a request, a JSON file. It writes the mesh and the result, another JSON
+file, or ends with exit code 77 if its program is not installed.
+
+All programs get the same polygons, because none of them reads every format: `assimp export` converts the input
+to a binary STL file. It applies the transforms of the scene, splits polygons into triangles and rounds the
+coordinates to single precision. Then points with identical coordinates are merged. Nothing is repaired: holes,
+orientations, intersecting, duplicate and degenerate triangles remain.
+"""
+import gzip
+import importlib
+import json
+import os
+import pathlib
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+
+PEERS = pathlib.Path(__file__).resolve().parent.parent
+PROGRAMS = pathlib.Path(os.environ.get("HERMESH_PEERS", PEERS.parents[1] / "build/release/reference/peers"))
+NOT_INSTALLED = 77
+STL_HEADER = 80
+sys.path.append(str(PEERS))
+import peer
+
+
+class Refused(Exception):
+    """The program does not accept the input, or made no mesh of it."""
+
+
+def not_installed(message):
+    print(message, file=sys.stderr)
+    sys.exit(NOT_INSTALLED)
+
+
+def require(module, package):
+    """Imports a module of a Debian package."""
+    try:
+        return importlib.import_module(module)
+    except ImportError as error:
+        not_installed(f"install the package {package}: {error}")
+
+
+def program(name, advice):
+    """Returns the path of an executable file or of a program in PATH."""
+    return shutil.which(name) or not_installed(f"{name} is not installed; {advice}")
+
+
+def length(request):
+    """Returns the voxel size. Programs without an error bound get voxels of the size of the requested error."""
+    return request.get("voxel_size") or request["error"]
+
+
+def fail_like(process):
+    """Ends like a program that failed: by the same signal, or with its last line and exit code."""
+    if process.returncode < 0:
+        signal.signal(-process.returncode, signal.SIG_DFL)
+        os.kill(os.getpid(), -process.returncode)
+    lines = (process.stderr.strip() or process.stdout.strip()).splitlines()
+    if process.returncode == NOT_INSTALLED:
+        not_installed(lines[-1])
+    print(process.stderr, file=sys.stderr)
+    sys.exit(process.returncode)
+
+
+def read_mesh(path):
+    """Returns points (n × 3, float32) and triangles (m × 3, int32) of any file that Assimp reads."""
+    numpy = require("numpy", "python3-numpy")
+    assimp = program("assimp", "install the package assimp-utils")
+    with tempfile.TemporaryDirectory() as work:
+        if path.endswith(".gz"):
+            packed, path = path, os.path.join(work, os.path.basename(path[:-3]))
+            with gzip.open(packed) as source, open(path, "wb") as target:
+                shutil.copyfileobj(source, target)
+        stl = os.path.join(work, "soup.stl")
+        done = subprocess.run([assimp, "export", path, stl, "-fstlb"], capture_output=True, text=True)
+        if not os.path.exists(stl):
+            lines = (done.stderr + done.stdout).strip().splitlines() or ["no message"]
+            raise Refused(f"Assimp cannot read the input: {lines[-1]}")
+        facet = numpy.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
+        corners = numpy.fromfile(stl, facet, offset=STL_HEADER + 4)["corners"].reshape(-1, 3)
+    if not len(corners):
+        raise Refused("Assimp finds no polygons in the input")
+    points, indices = numpy.unique(corners, axis=0, return_inverse=True)
+    return points, indices.reshape(-1, 3).astype(numpy.int32)
+
+
+def write_ply(path, points, polygons):
+    """Writes a mesh; `polygons` is a list of arrays of triangles or quads."""
+    import numpy
+    with open(path, "wb") as file:
+        file.write((f"ply\nformat binary_little_endian 1.0\nelement vertex {len(points)}\n"
+                    "property double x\nproperty double y\nproperty double z\n"
+                    f"element face {sum(map(len, polygons))}\nproperty list uchar int vertex_indices\n"
+                    "end_header\n").encode())
+        file.write(numpy.asarray(points, "<f8").tobytes())
+        for corners in polygons:
+            rows = numpy.empty(len(corners), [("count", "u1"), ("corners", "<i4", corners.shape[1])])
+            rows["count"], rows["corners"] = corners.shape[1], corners
+            file.write(rows.tobytes())
+
+
+def save(request, points, polygons, seconds, claims):
+    polygons = [corners for corners in polygons if len(corners)]
+    if not polygons:
+        raise Refused("the mesh of the program is empty")
+    write_ply(request["output"], points, polygons)
+    return {"seconds": seconds, "claims": claims}
+
+
+def with_arrays(remesh, **claims):
+    """Returns the work of an adapter that calls remesh(request, points, triangles), which returns points and a
+    list of arrays of triangles or quads.
+    """
+    def work(request):
+        mesh = read_mesh(request["input"])
+        start = time.perf_counter()
+        points, polygons = remesh(request, *mesh)
+        return save(request, points, polygons, time.perf_counter() - start, claims)
+    return work
+
+
+def with_files(request, command, refusal="", **claims):
+    """Runs a peer whose arguments contain IN.obj and OUT.obj, and which prints its seconds. A message that
+    contains the text `refusal` means that the program refuses the input.
+    """
+    import numpy
+    points, triangles = read_mesh(request["input"])
+    with tempfile.TemporaryDirectory() as work:
+        names = {name: os.path.join(work, name) for name in ("IN.obj", "OUT.obj")}
+        peer.write_obj(names["IN.obj"], points, triangles)
+        done = subprocess.run([names.get(word, str(word)) for word in command], capture_output=True, text=True)
+        if refusal and refusal in done.stderr:
+            raise Refused(next(line.strip() for line in done.stderr.splitlines() if refusal in line))
+        if done.returncode or not os.path.exists(names["OUT.obj"]):
+            fail_like(done)
+        seconds = [line.split()[1] for line in done.stdout.splitlines() if line.startswith("seconds ")]
+        points, triangles = peer.read_obj(names["OUT.obj"])
+    return save(request, points, [triangles], float(seconds[-1]) if seconds else None, claims)
+
+
+def run(work):
+    """Answers the request that the last argument names. `work` writes the mesh and returns seconds and claims."""
+    with open(sys.argv[-1]) as file:
+        request = json.load(file)
+    cpus = sorted(os.sched_getaffinity(0))
+    os.sched_setaffinity(0, cpus[:request.get("threads") or None])  # every library and child respects it
+    try:
+        result = {"status": "done", "message": "", **work(request)}
+    except Refused as reason:
+        result = {"status": "refused", "message": str(reason)}
+    with open(request["result"], "w") as file:
+        json.dump(result, file)

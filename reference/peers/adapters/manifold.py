@@ -1,0 +1,18 @@
+"""Manifold's simplify, for meshes that are manifold already: manifold.py REQUEST
+
+It refuses other meshes. The tolerance is the error, or a quarter of a voxel. The reference of
+Manifold.simplify states that "all surfaces will have moved by less than tolerance"; every Manifold is an "oriented,
+2-manifold, triangle mesh", a closed one.
+"""
+import adapter
+
+
+def work(request):
+    tolerance = request.get("error") or 0.25 * request["voxel_size"]
+    node = adapter.program("node", "install the package nodejs")
+    return adapter.with_files(request, [node, adapter.PEERS / "manifold_peer.mjs", "IN.obj", "OUT.obj", tolerance],
+                              refusal="anifold", watertight=True, manifold=True, distance_to_input=tolerance,
+                              distance_from_input=tolerance)
+
+
+adapter.run(work)
