@@ -4,9 +4,9 @@ An adapter is started with the path of a request, a JSON file. It writes the mes
 file, or ends with exit code 77 if its program is not installed.
 
 All programs get the same polygons, because none of them reads every format: `assimp export` converts the input
-to a binary STL file. It applies the transforms of the scene, splits polygons into triangles and rounds the
-coordinates to single precision. Then points with identical coordinates are merged. Nothing is repaired: holes,
-orientations, intersecting, duplicate and degenerate triangles remain.
+to an OBJ file. It applies the transforms of the scene, splits polygons into triangles and rounds the
+coordinates to single precision. Then points with identical coordinates are merged, and unused points omitted. Nothing is
+repaired: holes, orientations, intersecting, duplicate and degenerate triangles remain.
 """
 import gzip
 import importlib
@@ -23,7 +23,6 @@ import time
 PEERS = pathlib.Path(__file__).resolve().parent.parent
 PROGRAMS = pathlib.Path(os.environ.get("HERMESH_PEERS", PEERS.parents[1] / "build/release/reference/peers"))
 NOT_INSTALLED = 77
-STL_HEADER = 80
 sys.path.append(str(PEERS))
 import peer
 
@@ -50,6 +49,13 @@ def program(name, advice):
     return shutil.which(name) or not_installed(f"{name} is not installed; {advice}")
 
 
+def node(script):
+    """Returns the command of a peer in JavaScript. Without the option, V8 reserves more address space for its
+    checks of memory accesses than the benchmark allows.
+    """
+    return [program("node", "install the package nodejs"), "--disable-wasm-trap-handler", PEERS / script]
+
+
 def length(request):
     """Returns the voxel size. Programs without an error bound get voxels of the size of the requested error."""
     return request.get("voxel_size") or request["error"]
@@ -67,6 +73,19 @@ def fail_like(process):
     sys.exit(process.returncode)
 
 
+def off_as_obj(source, target):
+    """Converts an OFF file to OBJ, because Assimp 5.2 loses polygons of files with comments or blank lines."""
+    with open(source) as file:
+        lines = [words for line in file if (words := line.split("#")[0].split())]
+    counts = lines.pop(0)[1:] or lines.pop(0)
+    vertices, faces = int(counts[0]), int(counts[1])
+    with open(target, "w") as file:
+        for words in lines[:vertices]:
+            file.write("v " + " ".join(words[:3]) + "\n")
+        for words in lines[vertices:vertices + faces]:
+            file.write("f " + " ".join(str(int(word) + 1) for word in words[1:1 + int(words[0])]) + "\n")
+
+
 def read_mesh(path):
     """Returns points (n × 3, float32) and triangles (m × 3, int32) of any file that Assimp reads."""
     numpy = require("numpy", "python3-numpy")
@@ -76,16 +95,22 @@ def read_mesh(path):
             packed, path = path, os.path.join(work, os.path.basename(path[:-3]))
             with gzip.open(packed) as source, open(path, "wb") as target:
                 shutil.copyfileobj(source, target)
-        stl = os.path.join(work, "soup.stl")
-        done = subprocess.run([assimp, "export", path, stl, "-fstlb"], capture_output=True, text=True)
-        if not os.path.exists(stl):
+        if path.endswith(".off"):
+            original, path = path, os.path.join(work, "off.obj")
+            try:
+                off_as_obj(original, path)
+            except (ValueError, IndexError):
+                path = original
+        obj = os.path.join(work, "mesh.obj")
+        done = subprocess.run([assimp, "export", path, obj, "-fobjnomtl", "-tri", "-ptv"], capture_output=True,
+                              text=True)
+        if not os.path.exists(obj):
             lines = (done.stderr + done.stdout).strip().splitlines() or ["no message"]
             raise Refused(f"Assimp cannot read the input: {lines[-1]}")
-        facet = numpy.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
-        corners = numpy.fromfile(stl, facet, offset=STL_HEADER + 4)["corners"].reshape(-1, 3)
-    if not len(corners):
+        points, triangles = peer.read_obj(obj)
+    if not len(triangles):
         raise Refused("Assimp finds no polygons in the input")
-    points, indices = numpy.unique(corners, axis=0, return_inverse=True)
+    points, indices = numpy.unique(points[triangles.ravel()].astype(numpy.float32), axis=0, return_inverse=True)
     return points, indices.reshape(-1, 3).astype(numpy.int32)
 
 

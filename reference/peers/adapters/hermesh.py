@@ -1,7 +1,7 @@
 """hermesh itself: hermesh.py [OPTION OF hermesh remesh]... REQUEST
 
-Topology is guaranteed by the default extractor (algorithms/extraction/README.md). Distances are certified with
---error only; --json reports them. The program is $HERMESH or build/release/hermesh.
+`hermesh list` states the guarantees of each extractor; distances are certified with --error only, and reported by
+--json. The program is $HERMESH or build/release/hermesh.
 """
 import json
 import os
@@ -10,7 +10,15 @@ import sys
 
 import adapter
 
-OUTSIDE_OF_THE_METHOD = ("read", "write")
+DEFAULT = "manifold-dual-contouring"
+GUARANTEES = {"watertight": "closed", "manifold": "manifold", "intersection_free": "no_self_intersection"}
+DISTANCES = {"distance_to_input": "certified_to_polygons", "distance_from_input": "certified_from_polygons"}
+
+
+def guarantees(program, extractor):
+    listed = json.loads(subprocess.run([program, "list", "--json"], capture_output=True, text=True).stdout)
+    promises = next(entry["promises"] for entry in listed["extractors"] if entry["name"] == extractor)
+    return {claim: promises[name] for claim, name in GUARANTEES.items() if promises[name]}
 
 
 def work(request):
@@ -27,13 +35,12 @@ def work(request):
         adapter.fail_like(done)
     if done.returncode:
         raise adapter.Refused(report["error"] or " ".join(report["notes"]))
-    figures = report["figures"]
-    distances = {"distance_to_input": figures.get("certified_to_polygons"),
-                 "distance_from_input": figures.get("certified_from_polygons")}
-    seconds = sum(stage["seconds"] for stage in report["stage_seconds"]
-                  if not stage["stage"].startswith(OUTSIDE_OF_THE_METHOD))
-    return {"seconds": seconds, "claims": {"watertight": True, "manifold": True, "intersection_free": True,
-                                           **{name: value for name, value in distances.items() if value}}}
+    # With --error the method is chosen for the bound, with the guarantees of the default extractor.
+    extractor = DEFAULT if request.get("error") else report["result"]["extractor"]
+    claims = guarantees(program, extractor)
+    claims |= {claim: report["figures"][name] for claim, name in DISTANCES.items() if name in report["figures"]}
+    seconds = sum(stage["seconds"] for stage in report["stage_seconds"] if stage["stage"] not in ("read", "write"))
+    return {"seconds": seconds, "claims": claims}
 
 
 adapter.run(work)

@@ -9,9 +9,8 @@ import adapter
 
 def work(request):
     tolerance = request.get("error") or 0.25 * request["voxel_size"]
-    node = adapter.program("node", "install the package nodejs")
-    return adapter.with_files(request, [node, adapter.PEERS / "manifold_peer.mjs", "IN.obj", "OUT.obj", tolerance],
-                              refusal="anifold", watertight=True, manifold=True, distance_to_input=tolerance,
+    return adapter.with_files(request, [*adapter.node("manifold_peer.mjs"), "IN.obj", "OUT.obj", tolerance],
+                              refusal="ManifoldError", watertight=True, manifold=True, distance_to_input=tolerance,
                               distance_from_input=tolerance)
 
 
