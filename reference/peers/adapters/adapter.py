@@ -150,14 +150,17 @@ def with_arrays(remesh, **claims):
 
 
 def with_files(request, command, refusal="", **claims):
-    """Runs a peer whose arguments contain IN.obj and OUT.obj, and which prints its seconds. A message that
+    """Runs a peer whose arguments contain IN.obj or IN.ply, and OUT.obj, and which prints its seconds. A message that
     contains the text `refusal` means that the program refuses the input.
     """
     import numpy
     points, triangles = read_mesh(request["input"])
     with tempfile.TemporaryDirectory() as work:
-        names = {name: os.path.join(work, name) for name in ("IN.obj", "OUT.obj")}
-        peer.write_obj(names["IN.obj"], points, triangles)
+        names = {name: os.path.join(work, name) for name in ("IN.obj", "IN.ply", "OUT.obj")}
+        if "IN.ply" in command:
+            write_ply(names["IN.ply"], points, [triangles])
+        else:
+            peer.write_obj(names["IN.obj"], points, triangles)
         done = subprocess.run([names.get(word, str(word)) for word in command], capture_output=True, text=True)
         if refusal and refusal in done.stderr:
             raise Refused(next(line.strip() for line in done.stderr.splitlines() if refusal in line))

@@ -3,7 +3,6 @@
 Parameters are the defaults, with the cell size of the request and Multisample, which the help of the filter
 describes as "much slower but less artifacts". The help promises no topology and no distance.
 """
-import os
 import tempfile
 
 import adapter
@@ -22,11 +21,11 @@ SCRIPT = """<!DOCTYPE FilterScript>
 
 def work(request):
     program = adapter.program("meshlabserver", "install the package meshlab")
-    os.environ["QT_QPA_PLATFORM"] = "offscreen"
+    display = adapter.program("xvfb-run", "install the packages xvfb and xauth: meshlabserver needs OpenGL")
     with tempfile.NamedTemporaryFile("w", suffix=".mlx") as script:
         script.write(SCRIPT.format(adapter.length(request)))
         script.flush()
-        return adapter.with_files(request, [program, "-i", "IN.obj", "-o", "OUT.obj", "-s", script.name])
+        return adapter.with_files(request, [display, "-a", program, "-i", "IN.ply", "-o", "OUT.obj", "-s", script.name])
 
 
 adapter.run(work)

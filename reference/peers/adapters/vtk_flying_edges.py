@@ -12,7 +12,7 @@ import sys
 
 import adapter
 
-MARGIN = 2  # voxels around the polygons
+MARGIN = 2.5  # voxels around the polygons: no vertex of the lattice is on their bounding box
 
 
 def polydata(points, triangles):
@@ -30,7 +30,7 @@ def polydata(points, triangles):
 def remesh(request, points, triangles):
     voxel = adapter.length(request)
     origin = points.min(axis=0).astype(float) - MARGIN * voxel
-    size = numpy.ceil((points.max(axis=0) - origin) / voxel).astype(int) + MARGIN + 1
+    size = numpy.ceil((points.max(axis=0) - origin) / voxel + MARGIN).astype(int) + 1
     image = vtk.vtkImageData()
     image.SetDimensions(*map(int, size))
     image.SetOrigin(*origin)
@@ -63,7 +63,7 @@ def remesh(request, points, triangles):
     if not mesh.GetNumberOfPolys():
         return [], []
     return (support.vtk_to_numpy(mesh.GetPoints().GetData()),
-            [support.vtk_to_numpy(mesh.GetPolys().GetConnectivityArray()).reshape(-1, 3)])
+            [support.vtk_to_numpy(mesh.GetPolys().GetConnectivityArray()).reshape(-1, 3)[:, ::-1]])
 
 
 vtk = adapter.require("vtk", "python3-vtk9")
