@@ -1,12 +1,13 @@
 """Shared by the adapters, which run other programs for `hermesh benchmark` (README.md, Adapters).
 
-An adapter is started with the path of a request, a JSON file. It writes the mesh and the result, another JSON
-file, or ends with exit code 77 if its program is not installed.
+An adapter is started with the path of a request, a JSON file, as its last argument. It writes the mesh and
+the result, another JSON file, or ends with exit code 77 if its program is not installed.
 
-All programs get the same polygons, because none of them reads every format: `assimp export` converts the input
-to an OBJ file. It applies the transforms of the scene, splits polygons into triangles and rounds the
-coordinates to single precision. Then points with identical coordinates are merged, and unused points omitted. Nothing is
-repaired: holes, orientations, intersecting, duplicate and degenerate triangles remain.
+All programs but hermesh get the same polygons, because none of them reads every format: `assimp export`
+converts the input to an OBJ file. It applies the transforms of the scene, splits polygons into triangles and
+rounds the coordinates to single precision. Then points with identical coordinates are merged, and unused
+points omitted. Nothing is repaired: holes, orientations, intersecting, duplicate and degenerate triangles
+remain.
 """
 import gzip
 import importlib
@@ -21,7 +22,7 @@ import tempfile
 import time
 
 PEERS = pathlib.Path(__file__).resolve().parent.parent
-PROGRAMS = pathlib.Path(os.environ.get("HERMESH_PEERS", PEERS.parents[1] / "build/release/reference/peers"))
+BUILD = PEERS.parents[1] / "build/release"
 NOT_INSTALLED = 77
 sys.path.append(str(PEERS))
 import peer
@@ -45,7 +46,7 @@ def require(module, package):
 
 
 def program(name, advice):
-    """Returns the path of an executable file or of a program in PATH."""
+    """Returns the path of an executable file, or of a program in PATH."""
     return shutil.which(name) or not_installed(f"{name} is not installed; {advice}")
 
 
@@ -57,24 +58,24 @@ def node(script):
 
 
 def length(request):
-    """Returns the voxel size. Programs without an error bound get voxels of the size of the requested error."""
+    """Returns the voxel size, which is the requested error for programs without an error bound."""
     return request.get("voxel_size") or request["error"]
 
 
 def fail_like(process):
-    """Ends like a program that failed: by the same signal, or with its last line and exit code."""
+    """Ends as a program did that failed: by the same signal, or with its messages and exit code."""
+    messages = process.stderr.strip() or process.stdout.strip()
+    if process.returncode == NOT_INSTALLED:
+        not_installed(messages.splitlines()[-1])
+    print(messages, file=sys.stderr)
     if process.returncode < 0:
         signal.signal(-process.returncode, signal.SIG_DFL)
         os.kill(os.getpid(), -process.returncode)
-    lines = (process.stderr.strip() or process.stdout.strip()).splitlines()
-    if process.returncode == NOT_INSTALLED:
-        not_installed(lines[-1])
-    print(process.stderr, file=sys.stderr)
-    sys.exit(process.returncode)
+    sys.exit(process.returncode or "the program wrote no mesh")
 
 
 def off_as_obj(source, target):
-    """Converts an OFF file to OBJ, because Assimp 5.2 loses polygons of files with comments or blank lines."""
+    """Converts OFF to OBJ, because Assimp 5.2 loses polygons of OFF files with comments or blank lines."""
     with open(source) as file:
         lines = [words for line in file if (words := line.split("#")[0].split())]
     counts = lines.pop(0)[1:] or lines.pop(0)
@@ -101,27 +102,29 @@ def read_mesh(path):
                 off_as_obj(original, path)
             except (ValueError, IndexError):
                 path = original
+        # Assimp's binary STL and PLY files are wrong for lines and for vertex colours.
         obj = os.path.join(work, "mesh.obj")
-        done = subprocess.run([assimp, "export", path, obj, "-fobjnomtl", "-tri", "-ptv"], capture_output=True,
-                              text=True)
+        done = subprocess.run([assimp, "export", path, obj, "-fobjnomtl", "-tri", "-ptv"],
+                              capture_output=True, text=True, errors="replace")
         if not os.path.exists(obj):
             lines = (done.stderr + done.stdout).strip().splitlines() or ["no message"]
             raise Refused(f"Assimp cannot read the input: {lines[-1]}")
         points, triangles = peer.read_obj(obj)
     if not len(triangles):
         raise Refused("Assimp finds no polygons in the input")
-    points, indices = numpy.unique(points[triangles.ravel()].astype(numpy.float32), axis=0, return_inverse=True)
+    corners = points[triangles.ravel()].astype(numpy.float32)
+    points, indices = numpy.unique(corners, axis=0, return_inverse=True)
     return points, indices.reshape(-1, 3).astype(numpy.int32)
 
 
 def write_ply(path, points, polygons):
     """Writes a mesh; `polygons` is a list of arrays of triangles or quads."""
     import numpy
+    header = ["ply", "format binary_little_endian 1.0", f"element vertex {len(points)}",
+              *(f"property double {axis}" for axis in "xyz"), f"element face {sum(map(len, polygons))}",
+              "property list uchar int vertex_indices", "end_header\n"]
     with open(path, "wb") as file:
-        file.write((f"ply\nformat binary_little_endian 1.0\nelement vertex {len(points)}\n"
-                    "property double x\nproperty double y\nproperty double z\n"
-                    f"element face {sum(map(len, polygons))}\nproperty list uchar int vertex_indices\n"
-                    "end_header\n").encode())
+        file.write("\n".join(header).encode())
         file.write(numpy.asarray(points, "<f8").tobytes())
         for corners in polygons:
             rows = numpy.empty(len(corners), [("count", "u1"), ("corners", "<i4", corners.shape[1])])
@@ -130,17 +133,14 @@ def write_ply(path, points, polygons):
 
 
 def save(request, points, polygons, seconds, claims):
-    polygons = [corners for corners in polygons if len(corners)]
-    if not polygons:
+    if not any(map(len, polygons)):
         raise Refused("the mesh of the program is empty")
-    write_ply(request["output"], points, polygons)
+    write_ply(request["output"], points, [corners for corners in polygons if len(corners)])
     return {"seconds": seconds, "claims": claims}
 
 
 def with_arrays(remesh, **claims):
-    """Returns the work of an adapter that calls remesh(request, points, triangles), which returns points and a
-    list of arrays of triangles or quads.
-    """
+    """Returns work() for remesh(request, points, triangles), which returns points and lists of polygons."""
     def work(request):
         mesh = read_mesh(request["input"])
         start = time.perf_counter()
@@ -149,11 +149,10 @@ def with_arrays(remesh, **claims):
     return work
 
 
-def with_files(request, command, refusal="", **claims):
-    """Runs a peer whose arguments contain IN.obj or IN.ply, and OUT.obj, and which prints its seconds. A message that
-    contains the text `refusal` means that the program refuses the input.
+def with_files(request, command, refusal=None, **claims):
+    """Runs a peer whose arguments contain IN.obj or IN.ply, and OUT.obj, and which may print its seconds. A
+    message that contains the text `refusal` means that the program refuses the input.
     """
-    import numpy
     points, triangles = read_mesh(request["input"])
     with tempfile.TemporaryDirectory() as work:
         names = {name: os.path.join(work, name) for name in ("IN.obj", "IN.ply", "OUT.obj")}
@@ -161,7 +160,8 @@ def with_files(request, command, refusal="", **claims):
             write_ply(names["IN.ply"], points, [triangles])
         else:
             peer.write_obj(names["IN.obj"], points, triangles)
-        done = subprocess.run([names.get(word, str(word)) for word in command], capture_output=True, text=True)
+        words = [names.get(word, str(word)) for word in command]
+        done = subprocess.run(words, capture_output=True, text=True, errors="replace")
         if refusal and refusal in done.stderr:
             raise Refused(next(line.strip() for line in done.stderr.splitlines() if refusal in line))
         if done.returncode or not os.path.exists(names["OUT.obj"]):
@@ -172,11 +172,11 @@ def with_files(request, command, refusal="", **claims):
 
 
 def run(work):
-    """Answers the request that the last argument names. `work` writes the mesh and returns seconds and claims."""
+    """Answers the request. `work` writes the mesh, and returns the seconds and claims of the result."""
     with open(sys.argv[-1]) as file:
         request = json.load(file)
-    cpus = sorted(os.sched_getaffinity(0))
-    os.sched_setaffinity(0, cpus[:request.get("threads") or None])  # every library and child respects it
+    # Every library and every child respects the affinity.
+    os.sched_setaffinity(0, sorted(os.sched_getaffinity(0))[:request.get("threads") or None])
     try:
         result = {"status": "done", "message": "", **work(request)}
     except Refused as reason:

@@ -1,7 +1,7 @@
 """hermesh itself: hermesh.py [OPTION OF hermesh remesh]... REQUEST
 
-`hermesh list` states the guarantees of each extractor; distances are certified with --error only, and reported by
---json. The program is $HERMESH or build/release/hermesh.
+`hermesh list` states the guarantees of each extractor; with an error, --json reports certified distances. The
+program is $HERMESH or build/release/hermesh. It reads the input itself, in double precision.
 """
 import json
 import os
@@ -15,32 +15,30 @@ GUARANTEES = {"watertight": "closed", "manifold": "manifold", "intersection_free
 DISTANCES = {"distance_to_input": "certified_to_polygons", "distance_from_input": "certified_from_polygons"}
 
 
-def guarantees(program, extractor):
-    listed = json.loads(subprocess.run([program, "list", "--json"], capture_output=True, text=True).stdout)
-    promises = next(entry["promises"] for entry in listed["extractors"] if entry["name"] == extractor)
-    return {claim: promises[name] for claim, name in GUARANTEES.items() if promises[name]}
+def call(*arguments):
+    program = adapter.program(os.environ.get("HERMESH", str(adapter.BUILD / "hermesh")), "build it")
+    done = subprocess.run([program, *arguments, "--json"], capture_output=True, text=True)
+    try:
+        return json.loads(done.stdout)
+    except ValueError:
+        adapter.fail_like(done)
 
 
 def work(request):
-    program = adapter.program(os.environ.get("HERMESH", str(adapter.PEERS.parents[1] / "build/release/hermesh")),
-                              "build it")
-    size = ["--error", repr(request["error"])] if request.get("error") else \
-        ["--voxel-size", repr(request["voxel_size"])]
+    size = "error" if request.get("error") else "voxel_size"
     threads = ["--threads", str(request["threads"])] if request.get("threads") else []
-    done = subprocess.run([program, "remesh", request["input"], request["output"], *size, *threads, "--json",
-                           *sys.argv[1:-1]], capture_output=True, text=True)
-    try:
-        report = json.loads(done.stdout)
-    except ValueError:
-        adapter.fail_like(done)
-    if done.returncode:
+    report = call("remesh", request["input"], request["output"], "--" + size.replace("_", "-"),
+                  repr(request[size]), *threads, *sys.argv[1:-1])
+    if report["exit_code"]:
         raise adapter.Refused(report["error"] or " ".join(report["notes"]))
-    # With --error the method is chosen for the bound, with the guarantees of the default extractor.
-    extractor = DEFAULT if request.get("error") else report["result"]["extractor"]
-    claims = guarantees(program, extractor)
-    claims |= {claim: report["figures"][name] for claim, name in DISTANCES.items() if name in report["figures"]}
-    seconds = sum(stage["seconds"] for stage in report["stage_seconds"] if stage["stage"] not in ("read", "write"))
-    return {"seconds": seconds, "claims": claims}
+    # With an error the method is chosen for the bound, with the guarantees of the default extractor.
+    name = DEFAULT if size == "error" else report["result"]["extractor"]
+    listed = next(entry["promises"] for entry in call("list")["extractors"] if entry["name"] == name)
+    claims = {claim: listed[guarantee] for claim, guarantee in GUARANTEES.items() if listed[guarantee]}
+    figures = report["figures"]
+    claims |= {claim: figures[figure] for claim, figure in DISTANCES.items() if figure in figures}
+    stages = [stage for stage in report["stage_seconds"] if stage["stage"] not in ("read", "write")]
+    return {"seconds": sum(stage["seconds"] for stage in stages), "claims": claims}
 
 
 adapter.run(work)

@@ -1,8 +1,8 @@
-"""Manifold's simplify, for meshes that are manifold already: manifold.py REQUEST
+"""Manifold's simplify: manifold.py REQUEST
 
-It refuses other meshes. The tolerance is the error, or a quarter of a voxel. The reference of
-Manifold.simplify states that "all surfaces will have moved by less than tolerance"; every Manifold is an "oriented,
-2-manifold, triangle mesh", a closed one.
+It refuses meshes that are not manifold. The tolerance is the error, or a quarter of a voxel. The reference of
+Manifold.simplify states that "all surfaces will have moved by less than tolerance"; each Manifold is an
+"oriented, 2-manifold, triangle mesh", which is closed.
 """
 import adapter
 
@@ -10,8 +10,8 @@ import adapter
 def work(request):
     tolerance = request.get("error") or 0.25 * request["voxel_size"]
     return adapter.with_files(request, [*adapter.node("manifold_peer.mjs"), "IN.obj", "OUT.obj", tolerance],
-                              refusal="ManifoldError", watertight=True, manifold=True, distance_to_input=tolerance,
-                              distance_from_input=tolerance)
+                              refusal="ManifoldError", watertight=True, manifold=True,
+                              distance_to_input=tolerance, distance_from_input=tolerance)
 
 
 adapter.run(work)

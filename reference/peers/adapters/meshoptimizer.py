@@ -1,11 +1,15 @@
 """meshoptimizer's remesh: meshoptimizer.py REQUEST
 
 Resolution of the longest side, at most 256, and the flag Solve. The release notes of version 1.3 describe the
-result as "a closed mesh", which is the claim watertight. They promise no distance, and say that features closer than a
-voxel may be merged.
+result as "a closed mesh", which is the claim watertight; they promise no distance, and state that features
+closer than a voxel may be merged. The function is experimental (README).
 """
 import adapter
 
-adapter.run(lambda request: adapter.with_files(
-    request, [*adapter.node("meshoptimizer_peer.mjs"), "remesh", "IN.obj", "OUT.obj", adapter.length(request)],
-    watertight=True))
+
+def work(request):
+    command = [*adapter.node("meshoptimizer_peer.mjs"), "remesh", "IN.obj", "OUT.obj"]
+    return adapter.with_files(request, [*command, adapter.length(request)], watertight=True)
+
+
+adapter.run(work)

@@ -1,13 +1,15 @@
-"""Open3D: samples with normals and screened Poisson reconstruction: open3d_poisson.py REQUEST
+"""Open3D, samples with normals and Poisson reconstruction: open3d_poisson.py REQUEST
 
-Four samples per square of a voxel, and the octree depth whose cells are at most a voxel wide in the reconstructed
-box, which is 1.1 times the model by default; the other options are the defaults
-(tutorial, Surface reconstruction). The surface is open where it leaves that box. The documentation promises no
-topology and no distance.
+Four samples per square of a voxel, and the octree depth whose cells are at most a voxel wide in the
+reconstructed box, which is 1.1 times the model by default; the other options are the defaults (tutorial,
+Surface reconstruction). The mesh is open where it reaches that box. The documentation promises no topology
+and no distance.
 """
 import math
 
 import adapter
+
+SAMPLES = 4
 
 
 def remesh(request, points, triangles):
@@ -15,8 +17,8 @@ def remesh(request, points, triangles):
     open3d.utility.random.seed(request.get("seed") or 0)
     mesh = open3d.geometry.TriangleMesh(open3d.utility.Vector3dVector(points),
                                         open3d.utility.Vector3iVector(triangles))
-    samples = max(1000, int(4 * mesh.get_surface_area() / voxel**2))
-    cloud = mesh.sample_points_uniformly(samples, use_triangle_normal=True)
+    count = max(1000, int(SAMPLES * mesh.get_surface_area() / voxel**2))
+    cloud = mesh.sample_points_uniformly(count, use_triangle_normal=True)
     depth = math.ceil(math.log2(1.1 * numpy.ptp(points, axis=0).max() / voxel))
     made, _ = open3d.geometry.TriangleMesh.create_from_point_cloud_poisson(cloud, depth=depth)
     return numpy.asarray(made.vertices), [numpy.asarray(made.triangles)]

@@ -1,9 +1,9 @@
 """OpenVDB, a level set and its mesh: openvdb.py [ADAPTIVITY] REQUEST
 
-The narrow band has the default half width of 3 voxels (openvdb/Types.h, LEVEL_SET_HALF_WIDTH). Adaptivity is 0,
-the default, for quads only, and up to 1 (tools/VolumeToMesh.h: "higher thresholds will allow more variation in
-polygon size"). The documentation promises no topology and no distance. The polygons of OpenVDB have their normals
-inside; they are flipped, as Blender does. Points are written in single precision, as OpenVDB returns them.
+The narrow band has the default half width of 3 voxels (openvdb/Types.h, LEVEL_SET_HALF_WIDTH). Adaptivity is
+0 by default, which gives quads only, and at most 1 (openvdb/tools/VolumeToMesh.h: "higher thresholds will
+allow more variation in polygon size"). The documentation promises no topology and no distance. The polygons
+have their normals inside, so they are flipped. Points have single precision, as OpenVDB returns them.
 """
 import sys
 
