@@ -9,6 +9,7 @@ rounds the coordinates to single precision. Then points with identical coordinat
 points omitted. Nothing is repaired: holes, orientations, intersecting, duplicate and degenerate triangles
 remain.
 """
+import ctypes
 import gzip
 import importlib
 import json
@@ -175,8 +176,10 @@ def run(work):
     """Answers the request. `work` writes the mesh, and returns the seconds and claims of the result."""
     with open(sys.argv[-1]) as file:
         request = json.load(file)
-    # Every library and every child respects the affinity.
-    os.sched_setaffinity(0, sorted(os.sched_getaffinity(0))[:request.get("threads") or None])
+    # Every library and every child respects the affinity. The system has chosen an idle processor to start on.
+    cpus = sorted(os.sched_getaffinity(0))
+    first = cpus.index(ctypes.CDLL(None).sched_getcpu())
+    os.sched_setaffinity(0, (cpus[first:] + cpus[:first])[:request.get("threads") or None])
     try:
         result = {"status": "done", "message": "", **work(request)}
     except Refused as reason:
