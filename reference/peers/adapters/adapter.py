@@ -25,6 +25,7 @@ import time
 PEERS = pathlib.Path(__file__).resolve().parent.parent
 BUILD = PEERS.parents[1] / "build/release"
 NOT_INSTALLED = 77
+SHELL_SIGNAL = 128  # plus its number is the exit code of a shell whose command ended by a signal
 sys.path.append(str(PEERS))
 import peer
 
@@ -69,9 +70,10 @@ def fail_like(process):
     if process.returncode == NOT_INSTALLED:
         not_installed(messages.splitlines()[-1])
     print(messages, file=sys.stderr)
-    if process.returncode < 0:
-        signal.signal(-process.returncode, signal.SIG_DFL)
-        os.kill(os.getpid(), -process.returncode)
+    number = -process.returncode if process.returncode < 0 else process.returncode - SHELL_SIGNAL
+    if number > 0:
+        signal.signal(number, signal.SIG_DFL)
+        os.kill(os.getpid(), number)
     sys.exit(process.returncode or "the program wrote no mesh")
 
 
