@@ -1,4 +1,8 @@
-"""Blender's modifier Remesh with voxels: blender -b --python blender_peer.py -- IN.obj OUT.obj VOXEL ADAPTIVITY"""
+"""Blender's modifier Remesh: blender -b --python blender_peer.py -- IN.obj OUT.obj VOXEL ADAPTIVITY|sharp
+
+With voxels, or in mode Sharp with cells of that size.
+"""
+import math
 import os
 import sys
 
@@ -6,16 +10,29 @@ sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
 import bpy
 import peer
 
+SMALLEST_VOXEL = 0.001
 source, target, voxel, adaptivity = sys.argv[sys.argv.index("--") + 1:]
 points, triangles = peer.read_obj(source)
+# Small models are enlarged, because Blender has no voxels below 0.0001.
+scale = max(1.0, SMALLEST_VOXEL / float(voxel))
+voxel = scale * float(voxel)
+points = scale * points
 mesh = bpy.data.meshes.new("peer")
 mesh.from_pydata(points.tolist(), [], triangles.tolist())
 thing = bpy.data.objects.new("peer", mesh)
 bpy.context.collection.objects.link(thing)
 modifier = thing.modifiers.new("remesh", "REMESH")
-modifier.mode = "VOXEL"
-modifier.voxel_size = float(voxel)
-modifier.adaptivity = float(adaptivity)
+if adaptivity == "sharp":
+    modifier.mode = "SHARP"
+    # The grid has 2^depth cells, and the longest side of the model is its size times the scale, at most 0.99.
+    cells = max(points.max(axis=0) - points.min(axis=0)) / voxel
+    modifier.octree_depth = min(12, max(1, math.ceil(math.log2(cells / 0.99))))
+    modifier.scale = min(0.99, cells / 2**modifier.octree_depth)
+    modifier.use_remove_disconnected = False
+else:
+    modifier.mode = "VOXEL"
+    modifier.voxel_size = voxel
+    modifier.adaptivity = float(adaptivity)
 
 
 def work():
@@ -26,4 +43,4 @@ def work():
 
 
 made = peer.measured(work)
-peer.write_obj(target, [v.co for v in made.vertices], [tuple(t.vertices) for t in made.loop_triangles])
+peer.write_obj(target, [v.co / scale for v in made.vertices], [tuple(t.vertices) for t in made.loop_triangles])

@@ -5,7 +5,8 @@ set -u
 cd "$(dirname "$0")"
 
 # One by one, because what a distribution has of these differs. Blender is the largest, with 430 MB on disk.
-for package in libcgal-dev libopenmesh-dev libvtk9-dev python3-skimage python3-openvdb python3-open3d blender nodejs; do
+for package in libcgal-dev libopenmesh-dev libvtk9-dev python3-skimage python3-openvdb python3-open3d blender nodejs \
+  assimp-utils python3-vtk9 meshlab xvfb xauth; do
   dpkg-query -W -f='${Status}' "$package" 2>/dev/null | grep -q 'ok installed' && continue
   echo "Installing $package"
   DEBIAN_FRONTEND=noninteractive apt-get install -y --no-install-recommends "$package" >/dev/null 2>&1 ||

@@ -1,0 +1,32 @@
+"""CGAL's alpha_wrap_3: cgal_alpha_wrap.py [ALPHA IN VOXELS] REQUEST
+
+The offset is a thirtieth of alpha, as in the examples of the user manual (3D Alpha Wrapping, Examples), which
+recommends "a small fraction of alpha" (Offset). Alpha is 1 voxel by default: the wrap enters cavities with a
+diameter of two voxels. With an error, alpha plus offset is the error. The program is in $HERMESH_PEERS or
+build/release/reference/peers.
+
+The reference of alpha_wrap_3 promises a "watertight, 2-manifold, and intersection-free" mesh that strictly
+contains the input. The manual states that the vertices are on the offset surface (Offset) and that all facets
+have a circumradius smaller than alpha (Alpha); so each point of the mesh is within alpha plus offset of the
+input. Nothing bounds the distance from the input to the mesh, because inner walls and narrow cavities are
+covered.
+"""
+import os
+import sys
+
+import adapter
+
+RATIO = 1 / 30
+
+
+def work(request):
+    voxels = float(sys.argv[1]) if len(sys.argv) > 2 else 1.0
+    alpha = request["error"] / (1 + RATIO) if request.get("error") else request["voxel_size"] * voxels
+    directory = os.environ.get("HERMESH_PEERS", f"{adapter.BUILD}/reference/peers")
+    program = adapter.program(f"{directory}/cgal_peer", "build the target peers")
+    return adapter.with_files(request, [program, "alpha-wrap", "IN.obj", "OUT.obj", alpha, alpha * RATIO],
+                              watertight=True, manifold=True, intersection_free=True,
+                              distance_to_input=alpha * (1 + RATIO))
+
+
+adapter.run(work)

@@ -1,0 +1,17 @@
+"""Manifold's simplify: manifold.py REQUEST
+
+It refuses meshes that are not manifold. The tolerance is the error, or a quarter of a voxel. The reference of
+Manifold.simplify states that "all surfaces will have moved by less than tolerance"; each Manifold is an
+"oriented, 2-manifold, triangle mesh", which is closed.
+"""
+import adapter
+
+
+def work(request):
+    tolerance = request.get("error") or 0.25 * request["voxel_size"]
+    return adapter.with_files(request, [*adapter.node("manifold_peer.mjs"), "IN.obj", "OUT.obj", tolerance],
+                              refusal="ManifoldError", watertight=True, manifold=True,
+                              distance_to_input=tolerance, distance_from_input=tolerance)
+
+
+adapter.run(work)
