@@ -52,6 +52,7 @@ class Ended:
     peak_mib: float
     output: str
     errors: str
+    wall_seconds: float
 
 
 @dataclasses.dataclass
@@ -80,7 +81,7 @@ def _start(command, prepare, number, **options):
     return subprocess.Popen(command, preexec_fn=prepare_child, process_group=0, **options)
 
 
-def run(command, limits, directory=None):
+def run(command, limits, directory=None, environment=None):
     """Runs a program and its children to the end or to a limit. Raises OSError if it cannot be started."""
     def prepare():
         resource.setrlimit(resource.RLIMIT_AS, (limits.memory_mib * MIB, limits.memory_mib * MIB))
@@ -88,14 +89,14 @@ def run(command, limits, directory=None):
     start, is_late, pid = time.monotonic(), False, 0
     with tempfile.TemporaryFile() as out, tempfile.TemporaryFile() as err:
         process = _start(command, prepare, signal.SIGKILL, stdin=subprocess.DEVNULL, stdout=out, stderr=err,
-                         cwd=directory)
+                         cwd=directory, env=environment)
         while not pid:
             time.sleep(0.002)
             pid, status, usage = os.wait4(process.pid, os.WNOHANG)
             if not pid and time.monotonic() - start > limits.seconds:
                 is_late = True
                 _kill_group(process.pid)
-        process.returncode = code = os.waitstatus_to_exitcode(status)
+        process.returncode, wall = (code := os.waitstatus_to_exitcode(status)), time.monotonic() - start
         out.seek(0)
         err.seek(0)
         output, errors = (file.read().decode(errors="replace") for file in (out, err))
@@ -107,7 +108,7 @@ def run(command, limits, directory=None):
         word = "memory limit"
     else:
         word = "crash" if code < 0 else "refused"
-    return Ended(word, code, usage.ru_utime + usage.ru_stime, usage.ru_maxrss / 1024, output, errors)
+    return Ended(word, code, usage.ru_utime + usage.ru_stime, usage.ru_maxrss / 1024, output, errors, wall)
 
 
 def ignore(_):
