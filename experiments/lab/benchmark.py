@@ -210,8 +210,8 @@ class Benchmark:
         with tempfile.TemporaryDirectory() as work:
             row, output = self._measure(model, path, method, work)
             row = {"sha256": model["sha256"], "method": method["name"], **row}
-            if "message" in row:  # must not depend on the temporary directory
-                row["message"] = row["message"].replace(f"{work}/", "")[:500]
+            if "message" in row:  # must not depend on directories of this machine
+                row["message"] = row["message"].replace(f"{work}/", "").replace(f"{path.parent}/", "")[:500]
             if row["status"] != "not installed" and rates.trouble(row):
                 self._draw(model, path, row, output)
         return row

@@ -170,7 +170,7 @@ def write_report(rows, methods, ours, question, out):
     out = pathlib.Path(out)
     text = [question, "", table(rows, methods)]
     if missing := [name for name in methods if not any(row["method"] == name for row in rows)]:
-        text += ["", f"Not installed, and left out: {', '.join(missing)}."]
+        text += ["", f"Not installed, and left out: {'; '.join(missing)}."]
     (out / "table.md").write_text("\n".join(text) + "\n")
     draw_profiles(rows, methods, out / "profiles.svg")
     (out / "gallery.html").write_text(gallery(rows, ours, question, out / "pictures"))

@@ -64,6 +64,7 @@ class Child(unittest.TestCase):
         script = "x = bytearray(100 * 2**20)\nfor _ in range(10**6): pass"
         ended = child.run([sys.executable, "-c", script], LIMITS)
         self.assertGreater(ended.peak_mib, 100)
+        self.assertLess(child.run(["sleep", "0.1"], LIMITS).peak_mib, 20)  # less than this process
         self.assertGreater(ended.cpu_seconds, 0.01)
 
 
@@ -324,7 +325,7 @@ class Benchmark(unittest.TestCase):
     def test_how_adapters_end(self):
         methods = [self.adapter(name, script) for name, script in (
             ("refuses", "end('refused', message='too thin')"), ("fails", "sys.exit('no licence')"),
-            ("silent", "pass"),
+            ("paths", "sys.exit(request['input'] + ' ' + request['output'])"), ("silent", "pass"),
             ("malformed", "write(CUBE); end(claims=dict(perfect=True))"), ("no mesh", "end()"),
             ("crash", "os.abort()"),
             ("absent", "print('no blender', file=sys.stderr); sys.exit(77)"))]
@@ -332,9 +333,9 @@ class Benchmark(unittest.TestCase):
                     {"name": "no program", "request": ["hermesh-absent-program"]}]
         rows = self.run_methods(methods, [CUBE, SHIFTED])
         self.assertEqual([row["status"] for row in rows if row["sha256"] == "0" * 64],
-                         ["refused", "refused", "wrong output", "wrong output", "wrong output", "crash"])
-        self.assertEqual([row["message"] for row in rows][:3],
-                         ["too thin", "no licence", "no result was written to request.result"])
+                         ["refused", "refused", "refused", "wrong output", "wrong output", "wrong output", "crash"])
+        self.assertEqual([row["message"] for row in rows][:4],
+                         ["too thin", "no licence", "model.off out.ply", "no result was written to request.result"])
         absent = [line for line in self.said if "not installed" in line]
         self.assertEqual(len(absent), 3)  # not of the second model
         self.assertIn("no blender", absent[0])
@@ -345,6 +346,7 @@ class Benchmark(unittest.TestCase):
         for changes, resolution in (({}, 20), ({"error": 0.01}, None)):
             row, = self.run_methods([copy], out=f"out{resolution}", **changes)
             request, input_file, voxel = json.loads(row["message"])
+            self.assertEqual(input_file, "model.off")
             expected = {"version": 1, "task": "remesh", "seed": 7, "threads": 1, "seconds": 30,
                         "memory_mib": 4096, "resolution": resolution}
             self.assertEqual(request | expected, request)
