@@ -32,6 +32,7 @@ import math
 import multiprocessing
 import os
 import pathlib
+import signal
 import sys
 import tempfile
 import tomllib
@@ -115,6 +116,7 @@ def _pool(jobs):
 
 
 def _take_cores(shares):
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent ends the workers
     os.sched_setaffinity(0, shares.get())
 
 
@@ -148,7 +150,7 @@ class Benchmark:
 
         first = next(tasks(methods), None)
         if first:
-            rows = work(first)
+            rows = work(first, is_first=True)
             self._report(first[0], rows, numbers, len(entries))
             missing = {row["method"] for row in rows if row["status"] == "not installed"}
             found = [m for m in methods if m["name"] not in missing]
@@ -190,7 +192,7 @@ class Benchmark:
                 reason.append(ended.status)
             return None
 
-    def _run_model(self, task, cache):
+    def _run_model(self, task, cache, is_first=False):
         """Runs methods on a model and appends their rows."""
         entry, methods = task
         path = corpus.location(entry, cache)
@@ -201,9 +203,12 @@ class Benchmark:
             append_rows(self._file("models"), [model])
         rows = []
         for method in methods:
-            rows.append(self._run_method(model, path, method))
-            if rows[-1]["status"] != "not installed":
-                append_rows(self._file("rows"), rows[-1:])
+            row = self._run_method(model, path, method)
+            rows.append(row)
+            if row["status"] == "not installed" and not is_first:  # it was with the first model
+                row["status"] = "refused"
+            if row["status"] != "not installed":
+                append_rows(self._file("rows"), [row])
         return rows
 
     def _run_method(self, model, path, method):

@@ -103,19 +103,20 @@ def profile(rows, column):
 def draw_profiles(rows, methods, file):
     """Writes the profiles of CPU time and of triangles as SVG."""
     with plots.style():
-        figure = plots.figure(18, 8)
+        figure = plots.figure(25, 9)
         for axes, (column, title) in zip(figure.subplots(1, 2, sharey=True), (
                 ("cpu_seconds", "CPU time"), ("triangles", "triangles"))):
             found = profile(rows, column)
-            largest = max([2.0, *(ratios[-1] for ratios, _ in found.values() if len(ratios))])
-            for method in (m for m in methods if m in found):
+            largest = 1.1 * max([2.0, *(ratios[-1] for ratios, _ in found.values() if len(ratios))])
+            for number, method in enumerate(m for m in methods if m in found):
                 ratios, shares = found[method]
                 x, y = [1, *ratios, largest], [0, *shares, max(shares, default=0)]
-                axes.step(x, y, where="post", label=method)
-            axes.set(xscale="log", xlim=(1, largest), ylim=(0, 1),
-                     xlabel=f"{title}, ratio to the least of all methods")
+                axes.step(x, y, where="post", label=method, linestyle=("-", "--", ":")[number // 10 % 3])
+            axes.set_xscale("log", base=2, subs=[])
+            axes.set(xlim=(1, largest), ylim=(0, 1), xlabel=f"{title}, ratio to the least of all methods")
+            axes.xaxis.set_major_formatter("{x:g}")
         figure.axes[0].set_ylabel("share of models, valid and near")
-        figure.axes[0].legend()
+        figure.axes[1].legend(loc="upper left", bbox_to_anchor=(1, 1))
         figure.savefig(file, format="svg", metadata={"Date": None, "Creator": None})
 
 

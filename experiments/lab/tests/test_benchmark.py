@@ -340,6 +340,12 @@ class Benchmark(unittest.TestCase):
         self.assertEqual(len(absent), 3)  # not of the second model
         self.assertIn("no blender", absent[0])
 
+    def test_no_adapter_is_left_out_of_hard_models(self):
+        script = "sys.exit(77) if 'v 9' in open(request['input']).read() else end('refused')"
+        hard = "v 9 0 0\nv 0 0 0\nv 0 9 0\nv 0 0 9\nf 2 3 1\nf 2 1 4\nf 2 4 3\nf 1 3 4\n"
+        rows = self.run_methods([self.adapter("dodges", script)], [CUBE, hard])
+        self.assertEqual([row["status"] for row in rows], ["refused", "refused"])
+
     def test_requests(self):
         copy = self.adapter("copy", "end('refused', message=json.dumps([request, "
                             "os.environ['HERMESH_INPUT'], os.environ.get('HERMESH_VOXEL_SIZE')]))")
