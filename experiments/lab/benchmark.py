@@ -1,52 +1,74 @@
-"""A benchmark of remeshing programs on a corpus of models: success rates by class, with confidence intervals.
+"""A benchmark of remeshing programs on a corpus of models: one row per model and program.
 
 An experiment file (TOML) has these keys:
 
+base        another file with some of these keys, which this one replaces; its methods follow (optional)
 question    one sentence
 corpus      table of files in experiments/data
-models      number of files in the random sample, or "all"
-seed        of the sample
+models      number of files, "all", or numbers by tier: {quick = 60, full = 500}
+sample      "random" with the seed (default), or "listed": the first of the column `order` of the corpus
+seed        of the sample, and of the programs
 resolution  voxels along the longest side of a model: the scale at which losses are measured
+error       share of the bounding box's diagonal; if given, programs get this bound instead of a voxel size
+threads     that a program may use (default: 1)
 seconds     limit of wall time per run
 memory_mib  limit of address space per run
-[[method]]  name, and request: the program and its arguments. {hermesh}, {input}, {output}, {resolution} and {voxel} (the
-            voxel size in the units of the file) are replaced
+[[method]]  name, and one of:
+            adapter  a program that follows the protocol (PROTOCOL.md) and its first arguments; words with a
+                     slash are paths in the checkout
+            request  a program without an adapter and its arguments, in which {hermesh}, {input}, {output},
+                     {resolution}, {voxel} (or {error}, in the units of the file), {seed} and {threads} are
+                     replaced; `claims` has what it claims of each mesh, e.g.
+                     {watertight = true, distance_to_input = "{error}"}
 
 Each run is a process of its own. Its row is on disk when it ends, and the same command continues after an
 interruption. Meshes are validated with `hermesh validate`, which shares no code with the methods.
 """
 
-import collections
+import contextlib
 import functools
 import json
+import math
+import multiprocessing
+import os
 import pathlib
-import statistics
+import signal
 import sys
 import tempfile
 import tomllib
 
-from scipy.stats import binomtest
+from . import child, corpus, polygons, protocol, rates
+from .rows import ROOT, LabError, append_rows, drop_torn_row
 
-from . import child, corpus
-from .rows import ROOT, LabError
-
-CLASSES = ["clean solid", "closed, self-intersecting", "closed, non-manifold or doubled", "few holes", "open sheets",
-           "flat", "no mesh"]
 FEW_HOLES = 0.02  # share of boundary edges among all edges
 FLAT = 1e-6  # thickness over length
-LOSS = INVENTED = 0.01  # shares of the visible surface, and of the output, above which they count
+THIN = 0.02  # share of the area that is thinner than a voxel
+THIN_RESOLUTION = 100
 VALIDATION = child.Limits(seconds=600, memory_mib=16_384)
+DEFECTS = ("boundary_edges", "non_manifold_edges", "non_manifold_vertices", "inconsistent_edges",
+           "inside_out_components", "self_intersecting_pairs")
+REQUIRED = {"question", "corpus", "models", "seed", "resolution", "seconds", "memory_mib", "method"}
+OPTIONAL = {"sample", "error", "threads"}
+
+
+def _read_with_base(path):
+    experiment = tomllib.loads(path.read_text())
+    if "base" not in experiment:
+        return experiment
+    base, own = _read_with_base(path.parent / experiment.pop("base")), experiment.get("method", [])
+    names = {method["name"] for method in own}
+    own += [method for method in base.get("method", []) if method["name"] not in names]
+    return {**base, **experiment, "method": own}
 
 
 def read_experiment(path):
-    with open(path, "rb") as file:
-        experiment = tomllib.load(file)
-    required = {"question", "corpus", "models", "seed", "resolution", "seconds", "memory_mib", "method"}
-    if difference := required ^ experiment.keys():
+    path = pathlib.Path(path)
+    experiment = _read_with_base(path)
+    if difference := (REQUIRED - experiment.keys()) | (experiment.keys() - REQUIRED - OPTIONAL):
         raise LabError(f"{path}: unknown or missing keys: {', '.join(sorted(difference))}")
-    for method in experiment["method"]:
-        if method.keys() != {"name", "request"}:
-            raise LabError(f"{path}: each [[method]] has a name and a request")
+    allowed = {"name", "request"}, {"name", "request", "claims"}, {"name", "adapter"}
+    if any(method.keys() not in allowed for method in experiment["method"]):
+        raise LabError(f"{path}: a [[method]] has a name, and an adapter or a request with optional claims")
     return experiment
 
 
@@ -65,148 +87,327 @@ def classify(report, info):
     return "closed, self-intersecting" if report["self_intersecting_pairs"] else "clean solid"
 
 
+def facts(ask, path):
+    """Returns what is computed of a model; ask(*arguments) returns the JSON document of a command."""
+    info, report = ask("info", str(path)), ask("validate", str(path))
+    info = info["result"] if info and "lower" in info["result"] else None
+    report = report if info and report and "boundary_edges" in report else None
+    lower, upper = (info["lower"], info["upper"]) if info else ([0.0] * 3, [0.0] * 3)
+    size, kind, tags = max(h - l for l, h in zip(lower, upper)), classify(report, info), []
+    if report and report["components"] > 1:
+        tags.append("several bodies")
+    if kind not in ("no mesh", "flat"):
+        try:
+            if polygons.thin_share(polygons.read(path)[0], size / THIN_RESOLUTION) > THIN:
+                tags.append("thinner than a voxel")
+        except ValueError:
+            tags.append("thickness unknown")
+    return {"class": kind, "tags": ", ".join(tags), "size": size, "diagonal": math.dist(lower, upper),
+            "largest_coordinate": max(map(abs, lower + upper)), "box": [lower, upper],
+            "triangles": report["triangles"] + 2 * report["quads"] if report else 0}
+
+
+def _pool(jobs):
+    """Returns worker processes with separate cores, since a program may use the first of those allowed."""
+    cores, shares = sorted(os.sched_getaffinity(0)), multiprocessing.SimpleQueue()
+    for number in range(jobs):
+        shares.put(cores[number::jobs] or cores)
+    return multiprocessing.Pool(jobs, _take_cores, (shares,))
+
+
+def _take_cores(shares):
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent ends the workers
+    os.sched_setaffinity(0, shares.get())
+
+
 class Benchmark:
-    def __init__(self, experiment, hermesh, out, say):
-        self.experiment, self.hermesh, self.out, self.say = experiment, hermesh, pathlib.Path(out), say
+    def __init__(self, experiment, hermesh, out, say, shard=""):
+        self.experiment, self.hermesh, self.out = experiment, hermesh, pathlib.Path(out)
+        self.shard, self._say = shard, say
         self.out.mkdir(parents=True, exist_ok=True)
         self.limits = child.Limits(experiment["seconds"], experiment["memory_mib"])
 
-    def run(self, entries, cache):
-        """Runs all methods on all models that have no row yet, and returns the rows."""
-        models = {row["sha256"]: row for row in self._rows("models")}
-        done = {(row["sha256"], row["method"]) for row in self._rows("rows")}
-        for number, entry in enumerate(entries, 1):
-            path = corpus.location(entry, cache)
-            todo = [m for m in self.experiment["method"] if (entry.sha256, m["name"]) not in done]
-            if entry.sha256 not in models:
-                models[entry.sha256] = self._append("models", self._facts(entry, path))
-            for method in todo:
-                row = self._append("rows", self._run_method(entry, models[entry.sha256], path, method))
-                self.say(f"{number} of {len(entries)}: {entry.name}, {method['name']}: {row['status']}")
-        chosen = {entry.sha256 for entry in entries}
-        rows = [row for row in self._rows("rows") if row["sha256"] in chosen]
-        return [{**row, "class": models[row["sha256"]]["class"]} for row in rows]
+    def __getstate__(self):
+        return {**self.__dict__, "_say": None}  # worker processes print nothing
 
-    def _rows(self, name):
-        file = self.out / f"{name}.jsonl"
-        if not file.exists():
-            return []
+    def run(self, entries, cache, jobs=1):
+        """Runs all methods on all models that have no row yet, and returns the rows.
+
+        Programs that are not installed are found with the first model and left out.
+        """
+        for name in ("models", "rows"):
+            if self._file(name).exists():
+                drop_torn_row(self._file(name))
+        done = {(row["sha256"], row["method"]) for row in self._read("rows")}
+        numbers = {entry.sha256: number for number, entry in enumerate(entries, 1)}
+        methods = self.experiment["method"]
+        work = functools.partial(self._run_model, cache=cache)
+
+        def tasks(methods):
+            for entry in entries:
+                if todo := [m for m in methods if (entry.sha256, m["name"]) not in done]:
+                    yield entry, todo
+
+        first = next(tasks(methods), None)
+        if first:
+            rows = work(first, is_first=True)
+            self._report(first[0], rows, numbers, len(entries))
+            missing = {row["method"] for row in rows if row["status"] == "not installed"}
+            found = [m for m in methods if m["name"] not in missing]
+            rest = [task for task in tasks(found) if task[0] is not first[0]]
+            with _pool(jobs) if jobs > 1 else contextlib.nullcontext() as pool:
+                for (entry, _), rows in zip(rest, pool.imap(work, rest) if pool else map(work, rest)):
+                    self._report(entry, rows, numbers, len(entries))
+        return [row for row in self.rows() if row["sha256"] in numbers]
+
+    def rows(self):
+        """Returns the rows of all shards with the class, tags and size of their models."""
+        models = {row["sha256"]: row for row in self._read("models")}
+        rows = {(row["sha256"], row["method"]): row for row in self._read("rows")}
+        return [{**row, **{key: models[sha][key] for key in ("class", "tags", "name")},
+                 "model_triangles": models[sha]["triangles"]}
+                for (sha, _), row in rows.items() if sha in models]
+
+    def _report(self, entry, rows, numbers, total):
+        for row in rows:
+            text = f" ({row['message']}); it is left out" if row["status"] == "not installed" else ""
+            where = f"{numbers[entry.sha256]} of {total}: {entry.name}"
+            self._say(f"{where}, {row['method']}: {row['status']}{text}")
+
+    def _file(self, name):
+        return self.out / f"{name}{self.shard}.jsonl"
+
+    def _read(self, name):
         # The last line is incomplete if the run was interrupted while it was written.
-        return [json.loads(line) for line in file.read_text().splitlines(keepends=True) if line.endswith("\n")]
+        return [json.loads(line) for file in sorted(self.out.glob(f"{name}*.jsonl"))
+                for line in file.read_text().splitlines(keepends=True) if line.endswith("\n")]
 
-    def _append(self, name, row):
-        file = self.out / f"{name}.jsonl"
-        if file.exists() and not (old := file.read_bytes()).endswith(b"\n"):
-            file.write_bytes(old[:old.rfind(b"\n") + 1])
-        with open(file, "a") as out:
-            out.write(json.dumps(row) + "\n")
+    def _ask(self, *arguments, reason=None):
+        """Returns the JSON document of a command. If it failed, returns None and appends to `reason`."""
+        ended = child.run([self.hermesh, *arguments, "--json"], VALIDATION)
+        try:
+            return json.loads(ended.output)
+        except ValueError:
+            if reason is not None:
+                reason.append(ended.status)
+            return None
+
+    def _run_model(self, task, cache, is_first=False):
+        """Runs methods on a model and appends their rows."""
+        entry, methods = task
+        path = corpus.location(entry, cache)
+        model = next((row for row in self._read("models") if row["sha256"] == entry.sha256), None)
+        if model is None:
+            model = {"sha256": entry.sha256, "package": entry.package, "path": entry.path, "name": entry.name,
+                     **facts(self._ask, path)}
+            append_rows(self._file("models"), [model])
+        rows = []
+        for method in methods:
+            row = self._run_method(model, path, method)
+            rows.append(row)
+            if row["status"] == "not installed" and not is_first:  # it was with the first model
+                row["status"] = "refused"
+            if row["status"] != "not installed":
+                append_rows(self._file("rows"), [row])
+        return rows
+
+    def _run_method(self, model, path, method):
+        with tempfile.TemporaryDirectory() as work:
+            row, output = self._measure(model, path, method, work)
+            row = {"sha256": model["sha256"], "method": method["name"], **row}
+            if "message" in row:  # must not depend on directories of this machine
+                row["message"] = row["message"].replace(f"{work}/", "").replace(f"{path.parent}/", "")[:500]
+            if row["status"] != "not installed" and rates.trouble(row):
+                self._draw(model, path, row, output)
         return row
 
-    def _ask(self, *arguments):
-        """Returns the JSON document of a hermesh command; None if it failed."""
-        ended = child.run([self.hermesh, *arguments, "--json"], VALIDATION)
+    def _measure(self, model, path, method, work):
+        experiment = self.experiment
+        voxel = (model["size"] or experiment["resolution"]) / experiment["resolution"]
+        goal = {"voxel_size": voxel, "resolution": experiment["resolution"]}
+        if "error" in experiment:
+            goal = {"error": experiment["error"] * model["diagonal"], "resolution": None}
+        file, request, environment = protocol.write_request(
+            work, input=str(path), **goal, seed=experiment["seed"], threads=experiment.get("threads", 1),
+            seconds=experiment["seconds"], memory_mib=experiment["memory_mib"])
+        words = {"hermesh": self.hermesh, "voxel": voxel, **request, "resolution": experiment["resolution"]}
+        command = [word.format(**words) for word in method.get("request") or method["adapter"]]
+        if "adapter" in method:
+            environment["HERMESH"] = self.hermesh
+            command = [str(ROOT / word) if "/" in word else word for word in command] + [file]
+            if absent := [word for word in command if "/" in word and not os.path.exists(word)]:
+                return {"status": "not installed", "message": f"{absent[0]} does not exist"}, None
+        if command[0] == "python3":
+            command[0] = sys.executable
+        try:
+            ended = child.run(command, self.limits, work, environment if "adapter" in method else None)
+        except OSError as error:
+            return {"status": "not installed", "message": str(error)}, None
+        row = {"status": ended.status, "exit_code": ended.exit_code, "cpu_seconds": ended.cpu_seconds,
+               "wall_seconds": ended.wall_seconds, "peak_mib": ended.peak_mib}
+        last_line = (ended.errors.strip().splitlines() or [""])[-1]
+        if ended.status != "done":
+            if ended.exit_code == protocol.NOT_INSTALLED and "adapter" in method:
+                row["status"] = "not installed"
+            return {**row, "message": last_line}, None
+        claims, seconds = method.get("claims", {}), None
+        if "adapter" in method:
+            try:
+                result = protocol.read_result(request["result"])
+            except ValueError as error:
+                return {**row, "status": "wrong output", "message": str(error)}, None
+            if result["status"] == "refused":
+                return {**row, "status": "refused", "message": str(result.get("message", ""))}, None
+            claims, seconds = result["claims"], result.get("seconds")
+        else:
+            claims = {name: float(value.format(**words)) if isinstance(value, str) else value
+                      for name, value in claims.items()}
+        return self._validate(row, model, path, request["output"], voxel, claims, seconds, ended)
+
+    def _validate(self, row, model, path, output, voxel, claims, seconds, ended):
+        reason = []
+        report = self._ask("validate", output, "--reference", str(path), "--voxel-size", repr(voxel),
+                           "--samples", "20000", "--solid-samples", "0", reason=reason)
+        if not report or not report.get("visible_loss"):
+            what = f"the validation ended with: {reason[0]}" if reason and reason[0].endswith("limit") \
+                else "the output is missing or not a mesh"
+            return {**row, "status": "wrong output", "message": what}, None
+
+        def ask(reference, *options):
+            found = self._ask("validate", output, "--reference", reference, "--samples", "20000",
+                              "--solid-samples", "0", *options)
+            if not found or "from_reference" not in found:
+                raise LabError(f"the output cannot be validated with the reference {reference} {options}")
+            return found
+
+        visible, defects = report["visible_loss"], {key: report[key] for key in DEFECTS if report[key]}
+        row.update(triangles=report["triangles"] + 2 * report["quads"], components=report["components"],
+                   watertight=not defects, defects=defects, claims=claims, failed_claims=[],
+                   # Without visible surface, the shares are undefined and nothing is lost.
+                   **{share: visible[f"{share}_share"]["value"] or 0.0
+                      for share in ("lost", "vanished", "filled", "invented")})
+        if seconds is not None:
+            row["seconds"] = seconds
+        mib = (os.path.getsize(path) + os.path.getsize(output)) / child.MIB
+        try:
+            row["failed_claims"] = protocol.failed_claims(
+                claims, seconds, ended, mib, report, model["largest_coordinate"], ask, path, output)
+        except LabError as error:
+            row["message"] = f"claims are not checked: {error}"
+        return row, output
+
+    def _draw(self, model, path, row, output):
+        """Writes pictures of a model and of an output for the gallery, unless they are of other formats."""
+        folder = self.out / "pictures"
+        folder.mkdir(exist_ok=True)
+        for source, name in ((path, rates.picture_name(row["sha256"])),
+                             (output, rates.picture_name(row["sha256"], row["method"]))):
+            if source is not None and not (folder / name).exists():
+                with contextlib.suppress(ValueError):
+                    (folder / name).write_bytes(polygons.picture(polygons.read(source)[0], model["box"]))
+
+
+def classify_corpus(path, hermesh, cache, seed, say):
+    """Adds the columns class, tags, triangles and order to a corpus. Existing classes are preserved."""
+    entries = corpus.read_corpus(path)
+    corpus.fetch([e for e in entries if not e.kind], cache, say)
+
+    def ask(*arguments):
+        ended = child.run([hermesh, *arguments, "--json"], child.Limits(60, VALIDATION.memory_mib))
+        if ended.status == "time limit":
+            say(f"{arguments[1]}: hermesh {arguments[0]} took more than 60 s")
         try:
             return json.loads(ended.output)
         except ValueError:
             return None
 
-    def _facts(self, entry, path):
-        info, report = self._ask("info", str(path)), self._ask("validate", str(path))
-        info = info["result"] if info and "lower" in info["result"] else None
-        report = report if info and report and "boundary_edges" in report else None
-        size = max(h - l for l, h in zip(info["lower"], info["upper"])) if info else 0.0
-        return {"sha256": entry.sha256, "package": entry.package, "path": entry.path, "class": classify(report, info),
-                "size": size, "triangles": report["triangles"] + 2 * report["quads"] if report else 0,
-                "components": report["components"] if report else 0}
-
-    def _run_method(self, entry, model, path, method):
-        voxel = model["size"] / self.experiment["resolution"]
-        with tempfile.TemporaryDirectory() as work:
-            output = pathlib.Path(work) / "out.ply"
-            words = {"hermesh": self.hermesh, "input": str(path), "output": str(output),
-                     "resolution": self.experiment["resolution"], "voxel": voxel}
-            ended = child.run([word.format(**words) for word in method["request"]], self.limits, work)
-            row = {"sha256": entry.sha256, "method": method["name"], "status": ended.status,
-                   "exit_code": ended.exit_code, "cpu_seconds": ended.cpu_seconds, "peak_mib": ended.peak_mib}
-            if ended.status != "done":
-                row["message"] = (ended.errors.strip().splitlines() or [""])[-1][:500]
-                return row
-            report = self._ask("validate", str(output), "--reference", str(path), "--voxel-size", repr(voxel),
-                               "--samples", "20000", "--solid-samples", "0")
-            if not report or not report.get("visible_loss"):
-                return {**row, "status": "wrong output", "message": "the output is missing or not a mesh"}
-            visible = report["visible_loss"]
-            row.update(
-                triangles=report["triangles"] + 2 * report["quads"], components=report["components"],
-                watertight=not any(report[key] for key in (
-                    "boundary_edges", "non_manifold_edges", "non_manifold_vertices", "inconsistent_edges",
-                    "inside_out_components", "self_intersecting_pairs")),
-                **{share: visible[f"{share}_share"]["value"] for share in ("lost", "vanished", "filled", "invented")})
-            return row
-
-
-def rate(count, of):
-    """Returns a percentage with its Wilson interval at 95 % as text."""
-    if not of:
-        return "–"
-    interval = binomtest(count, of).proportion_ci(method="wilson")
-    return f"{100 * count / of:.1f} [{100 * interval.low:.1f}, {100 * interval.high:.1f}]"
-
-
-def table(rows, methods):
-    """Returns the success rates as a table in Markdown."""
-    head = ["method", "class", "models", "remeshed %", "watertight %", f"loss > {LOSS:.0%}", f"vanished > {LOSS:.0%}",
-            f"invented > {INVENTED:.0%}", "median CPU s", "of the first method's", "median MiB"]
-    lines = ["| " + " | ".join(head) + " |", "| --- | --- |" + " --: |" * (len(head) - 2)]
-    seconds = {(r["sha256"], r["method"]): r["cpu_seconds"] for r in rows if r["status"] == "done"}
-    for method in methods:
-        own = [r for r in rows if r["method"] == method]
-        groups = collections.defaultdict(list)
-        for row in own:
-            groups[row["class"]].append(row)
-        groups["all meshes"] = [r for r in own if r["class"] != "no mesh"]
-        for name in [*CLASSES, "all meshes"]:
-            if not groups[name]:
-                continue
-            made = [r for r in groups[name] if r["status"] == "done"]
-            ratios = [r["cpu_seconds"] / seconds[r["sha256"], methods[0]] for r in made
-                      if seconds.get((r["sha256"], methods[0]))]
-            share = [rate(sum(r[key] > limit for r in made), len(made))
-                     for key, limit in (("lost", LOSS), ("vanished", LOSS), ("invented", INVENTED))]
-            lines.append("| " + " | ".join([
-                method, name, str(len(groups[name])), rate(len(made), len(groups[name])),
-                rate(sum(r["watertight"] for r in made), len(made)), *share,
-                f"{statistics.median(r['cpu_seconds'] for r in made):.2f}" if made else "–",
-                f"{statistics.median(ratios):.2f}" if ratios else "–",
-                f"{statistics.median(r['peak_mib'] for r in made):.0f}" if made else "–"]) + " |")
-    return "\n".join(lines)
+    for number, entry in enumerate(entries, 1):
+        if not entry.kind:
+            found = facts(ask, corpus.location(entry, cache))
+            entry.kind, entry.tags, entry.triangles = found["class"], found["tags"], found["triangles"]
+            corpus.write_corpus(path, entries)
+            say(f"{number} of {len(entries)}: {entry.name}: {entry.kind}; {entry.tags}; {entry.triangles}")
+    corpus.set_order(entries, seed)
+    corpus.write_corpus(path, entries)
 
 
 def add_command(subparsers):
-    parser = subparsers.add_parser("benchmark", help="run programs on a corpus of models and print their success rates")
-    parser.add_argument("experiment", help="name in experiments/lab/questions, or a TOML file")
-    parser.add_argument("--out", type=pathlib.Path, help="directory of the rows (default: results/local/EXPERIMENT)")
-    parser.add_argument("--hermesh", default=str(ROOT / "build/release/hermesh"), help="the program that validates")
+    parser = subparsers.add_parser("benchmark",
+                                   help="run programs on a corpus of models and print their success rates")
+    parser.add_argument("experiment", nargs="?", help="name in experiments/lab/questions, or a TOML file")
+    parser.add_argument("--out", type=pathlib.Path,
+                        help="directory of the rows (default: results/local/EXPERIMENT)")
+    parser.add_argument("--hermesh", default=str(ROOT / "build/release/hermesh"),
+                        help="the program that validates")
     parser.add_argument("--program", action="append", default=[], metavar="NAME=FILE",
-                        help="also run this program with the first method's arguments, e.g. another version of it")
-    parser.add_argument("--models", type=int, help="size of the sample instead of the experiment's")
+                        help="also run this program with the first method's arguments, e.g. another version")
+    parser.add_argument("--method", action="append", help="run only this method; may be repeated")
+    parser.add_argument("--tier", choices=["quick", "full"], default="quick",
+                        help="number of models that the experiment specifies for this tier (default: quick)")
+    parser.add_argument("--models", type=int, help="number of models instead of the experiment's")
+    parser.add_argument("--sample", choices=["random", "listed"],
+                        help="kind of sample instead of the experiment's")
+    parser.add_argument("--shard", metavar="I/N",
+                        help="run only every N-th model, from the I-th; rows go to files of their own")
+    parser.add_argument("--jobs", type=int, default=min(2, os.cpu_count() or 1),
+                        help="models at a time (default: 2, on one core 1)")
+    parser.add_argument("--compare", nargs=2, type=pathlib.Path, metavar=("A", "B"),
+                        help="compare two directories of rows except for times and memory; "
+                        "exit with 3 if they differ")
+    parser.add_argument("--classify", type=pathlib.Path, metavar="CORPUS",
+                        help="compute the columns class, tags, triangles and order of a corpus")
     parser.set_defaults(function=run)
 
 
+def _parse_shard(text):
+    try:
+        number, count = map(int, text.split("/"))
+    except ValueError:
+        number = count = 0
+    if not 1 <= number <= count:
+        raise LabError(f"--shard {text}: expected I/N with I from 1 to N, e.g. 3/10")
+    return number, count
+
+
 def run(arguments):
+    say, cache = functools.partial(print, file=sys.stderr, flush=True), corpus.cache_directory()
+    if arguments.compare:
+        differences = rates.differences(*arguments.compare)
+        print("\n".join(differences) or "The rows are equal except for times and memory.")
+        return 3 if differences else 0
+    if arguments.classify:
+        classify_corpus(arguments.classify, arguments.hermesh, cache, 1, say)
+        return 0
+    if not arguments.experiment:
+        raise LabError("benchmark: name an experiment, or pass --compare or --classify")
     file = pathlib.Path(arguments.experiment)
     if not file.suffix:
         file = ROOT / "experiments/lab/questions" / f"{arguments.experiment}.toml"
     experiment = read_experiment(file)
     for program in arguments.program:
         name, _, path = program.partition("=")
-        request = [path if word == "{hermesh}" else word for word in experiment["method"][0]["request"]]
-        experiment["method"].append({"name": name, "request": request})
+        first = experiment["method"][0]
+        request = [path if word == "{hermesh}" else word for word in first["request"]]
+        experiment["method"].append({**first, "name": name, "request": request})
+    if arguments.method:
+        known = [method["name"] for method in experiment["method"]]
+        if unknown := set(arguments.method) - set(known):
+            raise LabError(f"{file}: there is no method {', '.join(unknown)}; expected {', '.join(known)}")
+        experiment["method"] = [m for m in experiment["method"] if m["name"] in arguments.method]
+    models = experiment["models"]
+    models = arguments.models or (models[arguments.tier] if isinstance(models, dict) else models)
     entries = corpus.read_corpus(ROOT / "experiments/data" / experiment["corpus"])
-    entries = corpus.sample(entries, arguments.models or experiment["models"], experiment["seed"])
-    cache = corpus.cache_directory()
-    say = functools.partial(print, file=sys.stderr, flush=True)
+    choose = corpus.listed if (arguments.sample or experiment.get("sample")) == "listed" else corpus.sample
+    entries, shard = choose(entries, models, experiment["seed"]), ""
+    if arguments.shard:
+        number, count = _parse_shard(arguments.shard)
+        entries, shard = entries[number - 1::count], f"-{number}-of-{count}"
     corpus.fetch(entries, cache, say)
-    rows = Benchmark(experiment, arguments.hermesh, arguments.out or ROOT / "results/local" / file.stem, say).run(entries, cache)
-    print(table(rows, [method["name"] for method in experiment["method"]]))
+    out = arguments.out or ROOT / "results/local" / file.stem
+    benchmark = Benchmark(experiment, os.path.abspath(arguments.hermesh), out, say, shard)
+    rows = benchmark.run(entries, cache, arguments.jobs)
+    ours = {m["name"] for m in experiment["method"] if m["name"].startswith("hermesh")}
+    rates.write_report(rows, [m["name"] for m in experiment["method"]], ours, experiment["question"], out)
+    print((out / "table.md").read_text())
+    say(f"Table, profiles and worst cases: {out}/table.md, profiles.svg, gallery.html")
     return 0

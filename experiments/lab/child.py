@@ -11,6 +11,7 @@ import dataclasses
 import json
 import os
 import pathlib
+import re
 import resource
 import select
 import signal
@@ -52,6 +53,7 @@ class Ended:
     peak_mib: float
     output: str
     errors: str
+    wall_seconds: float
 
 
 @dataclasses.dataclass
@@ -80,25 +82,29 @@ def _start(command, prepare, number, **options):
     return subprocess.Popen(command, preexec_fn=prepare_child, process_group=0, **options)
 
 
-def run(command, limits, directory=None):
+def run(command, limits, directory=None, environment=None):
     """Runs a program and its children to the end or to a limit. Raises OSError if it cannot be started."""
     def prepare():
         resource.setrlimit(resource.RLIMIT_AS, (limits.memory_mib * MIB, limits.memory_mib * MIB))
 
-    start, is_late, pid = time.monotonic(), False, 0
+    start, is_late, pid, sampled = time.monotonic(), False, 0, 0
     with tempfile.TemporaryFile() as out, tempfile.TemporaryFile() as err:
         process = _start(command, prepare, signal.SIGKILL, stdin=subprocess.DEVNULL, stdout=out, stderr=err,
-                         cwd=directory)
+                         cwd=directory, env=environment)
         while not pid:
             time.sleep(0.002)
+            sampled = max(sampled, _peak_kib(process.pid))
             pid, status, usage = os.wait4(process.pid, os.WNOHANG)
             if not pid and time.monotonic() - start > limits.seconds:
                 is_late = True
                 _kill_group(process.pid)
-        process.returncode = code = os.waitstatus_to_exitcode(status)
+        process.returncode, wall = (code := os.waitstatus_to_exitcode(status)), time.monotonic() - start
         out.seek(0)
         err.seek(0)
         output, errors = (file.read().decode(errors="replace") for file in (out, err))
+    # The peak of a process includes that of this one, from which it was forked; smaller peaks are sampled.
+    own = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    peak = sampled if sampled and usage.ru_maxrss <= own else usage.ru_maxrss
     if is_late:
         word = "time limit"
     elif code == 0:
@@ -107,7 +113,7 @@ def run(command, limits, directory=None):
         word = "memory limit"
     else:
         word = "crash" if code < 0 else "refused"
-    return Ended(word, code, usage.ru_utime + usage.ru_stime, usage.ru_maxrss / 1024, output, errors)
+    return Ended(word, code, usage.ru_utime + usage.ru_stime, peak / 1024, output, errors, wall)
 
 
 def ignore(_):
@@ -196,6 +202,17 @@ def _parsed(line):
     with contextlib.suppress(ValueError):
         answer = json.loads(line)
         return answer if isinstance(answer, dict) else None
+
+
+def _peak_kib(pid):
+    """Returns the largest peak of resident memory of a process and its descendants, 0 if it has ended."""
+    folder = pathlib.Path("/proc", str(pid))
+    try:
+        peak = re.search(r"VmHWM:\s+(\d+)", (folder / "status").read_text())
+        children = (folder / "task" / str(pid) / "children").read_text().split()
+    except OSError:
+        return 0
+    return max([int(peak[1]) if peak else 0, *map(_peak_kib, children)])
 
 
 def resident_bytes(pid):

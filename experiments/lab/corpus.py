@@ -1,16 +1,19 @@
 """Corpora of mesh files that are published in Debian packages.
 
 A corpus is a table of tab-separated values in experiments/data, one file per line: package, version, path,
-sha256, format, bytes, licence. A path has the form ARCHIVE!MEMBER if the file is inside an archive of the
+sha256, format, bytes, licence, and what is computed of it: class, tags, triangles, and order, a stratified
+random permutation (set_order()). A path has the form ARCHIVE!MEMBER if the file is inside an archive of the
 package. Nothing is installed: packages are downloaded with apt, and the required files are unpacked into the
 cache.
 """
 
+import collections
 import csv
 import dataclasses
 import hashlib
 import io
 import json
+import math
 import os
 import pathlib
 import posixpath
@@ -23,7 +26,10 @@ import zipfile
 from .rows import LabError
 
 
-@dataclasses.dataclass(frozen=True)
+SIZES = {1_000: "below 1,000 triangles", 10_000: "below 10,000", 100_000: "below 100,000", math.inf: "larger"}
+
+
+@dataclasses.dataclass
 class Entry:
     package: str
     version: str
@@ -32,6 +38,10 @@ class Entry:
     format: str
     bytes: int
     licence: str
+    kind: str = ""  # column "class"
+    tags: str = ""
+    triangles: int = 0
+    order: int = 0  # from 1; 0: not computed
 
     @property
     def name(self):
@@ -41,7 +51,57 @@ class Entry:
 def read_corpus(path):
     """Returns the entries of a corpus."""
     with open(path, newline="") as file:
-        return [Entry(**{**row, "bytes": int(row["bytes"])}) for row in csv.DictReader(file, delimiter="\t")]
+        rows = [{"kind" if key == "class" else key: value for key, value in row.items()}
+                for row in csv.DictReader(file, delimiter="\t")]
+    numbers = ("bytes", "triangles", "order")
+    return [Entry(**{key: int(value or 0) if key in numbers else value for key, value in row.items()})
+            for row in rows]
+
+
+def write_corpus(path, entries):
+    """Replaces a corpus by these entries."""
+    names = [field.name for field in dataclasses.fields(Entry)]
+    partial = pathlib.Path(path).with_suffix(".partial")
+    with open(partial, "w", newline="") as file:
+        out = csv.writer(file, delimiter="\t", lineterminator="\n")
+        out.writerow(["class" if name == "kind" else name for name in names])
+        out.writerows([getattr(entry, name) for name in names] for entry in entries)
+    partial.rename(path)
+
+
+def size_group(triangles):
+    """Returns the name of the group of models of this size."""
+    return next(name for limit, name in SIZES.items() if triangles < limit)
+
+
+def set_order(entries, seed):
+    """Numbers the entries from 1, such that the first n contain each stratum in proportion, for any n.
+
+    Strata are classes of one group of size. Within a stratum, the order is that of the SHA-256 of the seed
+    and the file's hash; entry k of a stratum of m gets the position (k + u) / m with a random u of the
+    stratum.
+    """
+    strata = collections.defaultdict(list)
+    for entry in entries:
+        strata[entry.kind, size_group(entry.triangles)].append(entry)
+
+    def key(text):
+        return hashlib.sha256(f"{seed} {text}".encode()).hexdigest()
+
+    positions = []
+    for name, own in strata.items():
+        offset = int(key(" ".join(name))[:8], 16) / 2**32
+        ranked = sorted(own, key=lambda e: key(e.sha256))
+        positions += [((rank + offset) / len(own), e.sha256, e) for rank, e in enumerate(ranked)]
+    for number, (*_, entry) in enumerate(sorted(positions, key=lambda position: position[:2]), 1):
+        entry.order = number
+
+
+def listed(entries, count, seed=None):
+    """Returns the first entries of the corpus by the column `order`; all of them if `count` is "all"."""
+    if any(not entry.order for entry in entries):
+        raise LabError("the corpus has no column order; hermesh benchmark --classify CORPUS computes it")
+    return sorted(entries, key=lambda e: e.order)[:None if count == "all" else count]
 
 
 def sample(entries, count, seed):
@@ -76,23 +136,35 @@ def fetch(entries, cache, say):
     Raises LabError if a package cannot be downloaded, or a file differs from the corpus.
     """
     missing = [e for e in entries if not location(e, cache).exists()]
-    for package in sorted({e.package for e in missing}):
+    packages = sorted({e.package for e in missing})
+    if packages:
+        total = sum(map(_package_bytes, packages)) / 2**20
+        say(f"{len(missing)} models are in {len(packages)} packages: {total:.0f} MiB to download")
+    for package in packages:
         wanted = [e for e in missing if e.package == package]
         with tempfile.TemporaryDirectory() as work:
             _unpack(_download(package, work, say), wanted, cache, work)
 
 
-def _download(package, work, say):
+def _package_bytes(package):
     try:
-        shown = subprocess.run(["apt-cache", "show", "--no-all-versions", package], capture_output=True, text=True)
-        size = next((int(line.split()[1]) for line in shown.stdout.splitlines() if line.startswith("Size:")), 0)
-        say(f"downloading {package}, {size / 2**20:.0f} MiB")
+        shown = subprocess.run(["apt-cache", "show", "--no-all-versions", package],
+                               capture_output=True, text=True)
+    except FileNotFoundError:
+        raise LabError(f"apt is required to download the package {package}") from None
+    return next((int(line.split()[1]) for line in shown.stdout.splitlines() if line.startswith("Size:")), 0)
+
+
+def _download(package, work, say):
+    say(f"downloading {package}, {_package_bytes(package) / 2**20:.0f} MiB")
+    try:
         got = subprocess.run(["apt-get", "download", package], cwd=work, capture_output=True, text=True)
     except FileNotFoundError:
         raise LabError(f"apt is required to download the package {package}") from None
     found = sorted(pathlib.Path(work).glob("*.deb"))
     if got.returncode or not found:
-        raise LabError(f"{package}: apt-get download failed: {got.stderr.strip() or 'no package'}; try apt-get update")
+        reason = got.stderr.strip() or "no package"
+        raise LabError(f"{package}: apt-get download failed: {reason}; try apt-get update")
     return found[0]
 
 

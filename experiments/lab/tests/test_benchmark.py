@@ -1,16 +1,50 @@
+import collections
+import hashlib
+import json
 import os
 import pathlib
+import shutil
+import subprocess
 import sys
 import tempfile
 import unittest
+from unittest import mock
 
-from .. import benchmark, child, corpus
+import numpy
+
+from .. import benchmark, child, corpus, polygons, protocol, rates
+from ..rows import ROOT, LabError
 
 HERMESH = os.environ.get("HERMESH")
 FACES = "0 2 3,0 3 1,4 5 7,4 7 6,0 1 5,0 5 4,2 6 7,2 7 3,0 4 6,0 6 2,1 3 7,1 7 5"
 CUBE = "\n".join(["OFF", "8 12 0", *(f"{x} {y} {z}" for z in (0, 2) for y in (0, 2) for x in (0, 2)),
                   *(f"3 {face}" for face in FACES.split(",")), ""])
 LIMITS = child.Limits(seconds=30, memory_mib=4096)
+WILD = ROOT / "experiments/data/wild.tsv"
+WILD_500 = "a2cd7b8c5889e36b8bee63f49c37b35922357583634736f93de1e7f03450a848"  # SHA-256 of its hashes
+SHIFTED = CUBE.replace("\n0 ", "\n0.1 ").replace("\n2 ", "\n2.1 ")
+# Part of an adapter: what it reads, and a function that writes a cube as a PLY file.
+ADAPTER = f"""
+import json, os, pathlib, sys, time
+request = json.loads(pathlib.Path(sys.argv[-1]).read_text())
+def write(off, faces=12):
+    lines = off.splitlines()
+    pathlib.Path(request["output"]).write_text(
+        "ply\\nformat ascii 1.0\\nelement vertex 8\\nproperty double x\\n"
+        "property double y\\nproperty double z\\nelement face %d\\nproperty list uchar int vertex_indices\\n"
+        "end_header\\n" % faces + "\\n".join(lines[2:10 + faces]) + "\\n")
+def end(status="done", **result):
+    pathlib.Path(request["result"]).write_text(json.dumps(dict(status=status, **result)))
+CUBE, SHIFTED = {CUBE!r}, {SHIFTED!r}
+"""
+
+
+def row_of(method="a", sha="1", **values):
+    """Returns a row as Benchmark.rows() does."""
+    return {"sha256": sha * 64, "method": method, "status": "done", "cpu_seconds": 1.0, "wall_seconds": 1.0,
+            "peak_mib": 50.0, "triangles": 100, "watertight": True, "defects": {}, "lost": 0.0,
+            "vanished": 0.0, "filled": 0.0, "invented": 0.0, "claims": {}, "failed_claims": [],
+            "class": "clean solid", "tags": "several bodies", "name": "cube.off", "model_triangles": 12, **values}
 
 
 class Child(unittest.TestCase):
@@ -30,6 +64,7 @@ class Child(unittest.TestCase):
         script = "x = bytearray(100 * 2**20)\nfor _ in range(10**6): pass"
         ended = child.run([sys.executable, "-c", script], LIMITS)
         self.assertGreater(ended.peak_mib, 100)
+        self.assertLess(child.run(["sleep", "0.1"], LIMITS).peak_mib, 20)  # less than this process
         self.assertGreater(ended.cpu_seconds, 0.01)
 
 
@@ -41,7 +76,8 @@ class Rates(unittest.TestCase):
         for change, bounds, expected in (
                 ({}, box, "clean solid"),
                 ({"self_intersecting_pairs": 1}, box, "closed, self-intersecting"),
-                ({"non_manifold_edges": 1, "self_intersecting_pairs": 1}, box, "closed, non-manifold or doubled"),
+                ({"non_manifold_edges": 1, "self_intersecting_pairs": 1}, box,
+                 "closed, non-manifold or doubled"),
                 ({"boundary_edges": 2}, box, "few holes"),  # of 151 edges
                 ({"boundary_edges": 20}, box, "open sheets"),
                 ({}, {"lower": [0, 0, 0], "upper": [1, 1, 0]}, "flat"),
@@ -51,7 +87,7 @@ class Rates(unittest.TestCase):
 
     def test_wilson_interval(self):
         # Wilson 1927, by hand for 9 of 10 at 95 %.
-        self.assertEqual(benchmark.rate(9, 10), "90.0 [59.6, 98.2]")
+        self.assertEqual(rates.rate(9, 10), "90.0 [59.6, 98.2]")
 
     def test_sample_depends_on_the_seed_only(self):
         entries = [corpus.Entry("p", "1", f"f{i}", f"{i:064}", "off", 1, "none") for i in range(100)]
@@ -60,9 +96,313 @@ class Rates(unittest.TestCase):
         self.assertEqual(first, corpus.sample(list(reversed(entries)), 10, 1)[::-1])
         self.assertNotEqual(first, corpus.sample(entries, 10, 2))
 
+    def test_each_prefix_of_the_order_has_each_stratum_in_proportion(self):
+        entries = [corpus.Entry("p", "1", f"f{i}", f"{i:064}", "off", 1, "none",
+                                kind="flat" if i < 30 else "clean solid", triangles=10 if i % 2 else 10**6)
+                   for i in range(300)]
+        corpus.set_order(entries, 1)
+        self.assertEqual(sorted(e.order for e in entries), list(range(1, 301)))
+        for count in (20, 60, 250):
+            chosen = collections.Counter((e.kind, e.triangles) for e in corpus.listed(entries, count))
+            for (kind, _), found in chosen.items():
+                self.assertLessEqual(abs(found - count * (15 if kind == "flat" else 135) / 300), 1)
+        first = [e.sha256 for e in corpus.listed(entries, 20)]
+        corpus.set_order(entries, 2)
+        self.assertNotEqual(first, [e.sha256 for e in corpus.listed(entries, 20)])
+
+    def test_wild_500_follows_from_its_seed(self):
+        entries = corpus.read_corpus(WILD)
+        stored = [e.sha256 for e in corpus.listed(entries, 500)]
+        self.assertTrue(all(e.kind in rates.CLASSES for e in entries))
+        corpus.set_order(entries, 1)
+        self.assertEqual(stored, [e.sha256 for e in corpus.listed(entries, 500)])
+        self.assertEqual(hashlib.sha256("\n".join(stored).encode()).hexdigest(), WILD_500)
+
+    def test_table(self):
+        claims = {"watertight": True}
+        rows = [row_of(), row_of(sha="2", watertight=False, claims=claims, failed_claims=["watertight"]),
+                row_of(sha="3", status="refused"), row_of(sha="4", lost=0.02, claims=claims),
+                row_of("b", status="not installed")]
+        line = rates.table(rows, ["a", "b"]).splitlines()[-1].split(" | ")
+        self.assertEqual(line[:3], ["| a", "all meshes", "4"])
+        self.assertEqual([cell.split()[0] for cell in line[3:8]], ["75.0", "50.0", "25.0", "50.0", "33.3"])
+
+    def test_profile(self):
+        # b takes twice as long as a on model 1, half as long on model 2; only a solves 3, no method solves 4.
+        rows = [row_of("a", "1"), row_of("b", "1", cpu_seconds=2), row_of("a", "2", cpu_seconds=4),
+                row_of("b", "2", cpu_seconds=2), row_of("a", "3"), row_of("b", "3", watertight=False),
+                row_of("a", "4", status="refused"), row_of("b", "4", status="crash"),
+                row_of("a", "5", **{"class": "no mesh"})]
+        found = rates.profile(rows, "cpu_seconds")
+        self.assertEqual([list(part) for part in found["a"]], [[1, 1, 2], [0.25, 0.5, 0.75]])
+        self.assertEqual([list(part) for part in found["b"]], [[1, 2], [0.25, 0.5]])
+
+    def test_gallery(self):
+        hostile = "</td><script>alert(1)</script>"
+        rows = [row_of("other", status="crash", message=hostile), row_of("ours", sha="3"),
+                row_of("ours", sha="2", lost=0.5, vanished=0.5)]
+        with tempfile.TemporaryDirectory() as work:
+            pictures = pathlib.Path(work)
+            (pictures / rates.picture_name("1" * 64)).write_bytes(b"png")
+            html = rates.gallery(rows, {"ours"}, "Why?", pictures)
+        self.assertEqual(html.count("<tr data"), 2)
+        self.assertLess(html.index("50.0% of the visible surface vanished"), html.index("crash: "))
+        self.assertNotIn(hostile, html)
+        self.assertEqual(html.count("data:image/png;base64,cG5n"), 1)
+
+    def test_differences(self):
+        with tempfile.TemporaryDirectory() as work:
+            folders = [pathlib.Path(work) / name for name in "abc"]
+            slower = row_of(cpu_seconds=2, peak_mib=1, failed_claims=["seconds"])
+            for folder, rows in zip(folders, ([row_of()], [slower], [row_of(triangles=99), row_of("b")])):
+                folder.mkdir()
+                (folder / "rows-1-of-2.jsonl").write_text("".join(json.dumps(row) + "\n" for row in rows))
+            self.assertEqual(rates.differences(folders[0], folders[1]), [])
+            found = rates.differences(folders[0], folders[2])
+            self.assertEqual([line.split(": ", 1)[1] for line in found],
+                             ["triangles: 100 and 99", f"only in {folders[2]}"])
+            with self.assertRaises(LabError):
+                rates.differences(folders[0], work)
+
+
+class Experiments(unittest.TestCase):
+    def test_files_of_the_project(self):
+        for file in (ROOT / "experiments/lab/questions").glob("wild*.toml"):
+            self.assertIn("method", benchmark.read_experiment(file))
+
+    def test_methods(self):
+        numbers = "".join(f"{key} = 1\n" for key in ("models", "seed", "resolution", "seconds", "memory_mib"))
+        head = f'question = ""\ncorpus = ""\n{numbers}[[method]]\nname = "a"\n'
+        with tempfile.TemporaryDirectory() as work:
+            file = pathlib.Path(work) / "a.toml"
+            for method, is_right in (('request = ["a"]', True), ('adapter = ["a"]', True), ("", False),
+                                     ('request = ["a"]\nclaims = {watertight = true}', True),
+                                     ('request = ["a"]\nadapter = ["a"]', False),
+                                     ('adapter = ["a"]\nclaims = {watertight = true}', False)):
+                file.write_text(head + method)
+                with self.subTest(method) if is_right else self.assertRaises(LabError):
+                    benchmark.read_experiment(file)
+            file.write_text(head + 'request = ["a"]')
+            other = pathlib.Path(work) / "b.toml"
+            other.write_text('base = "a.toml"\nresolution = 5')
+            self.assertEqual(benchmark.read_experiment(other)["resolution"], 5)
+
+
+class Polygons(unittest.TestCase):
+    def test_formats(self):
+        lines = CUBE.splitlines()
+        points, faces = lines[2:10], [line.split()[1:] for line in lines[10:]]
+        corners = numpy.array([[list(map(float, points[int(i)].split())) for i in face] for face in faces])
+        head = "ply\nformat %s 1.0\nelement vertex 8\nproperty float x\nproperty float y\n" \
+               "property float z\nelement face 12\nproperty list uchar int vertex_indices\nend_header\n"
+        record = numpy.zeros(12, [("count", "u1"), ("v", "<i4", 3)])
+        record["count"], record["v"] = 3, numpy.array(faces, int)
+        numbers = [list(map(int, face)) for face in faces]
+        stl = numpy.zeros(12, [("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
+        stl["corners"] = corners
+        files = {
+            "a.off": CUBE.encode(), "a.ply": (head % "ascii" + "\n".join(lines[2:])).encode(),
+            "b.ply": (head % "binary_little_endian").encode()
+            + numpy.array([p.split() for p in points], "<f4").tobytes() + record.tobytes(),
+            "a.obj": ("".join(f"v {p}\n" for p in points)
+                      + "".join("f %d/1 %d %d\n" % (a + 1, b + 1, c - 8) for a, b, c in numbers)).encode(),
+            "a.stl": bytes(80) + numpy.uint32(12).tobytes() + stl.tobytes(),
+            "b.stl": "".join("vertex %g %g %g\n" % tuple(p) for p in corners.reshape(-1, 3)).encode()}
+        with tempfile.TemporaryDirectory() as work:
+            for name, content in files.items():
+                path = pathlib.Path(work) / name
+                path.write_bytes(content)
+                found, is_triangle = polygons.read(path)
+                numpy.testing.assert_array_equal(found, corners, name)
+                self.assertTrue(is_triangle.all())
+            path.write_text("solid")
+            for wrong in (path, pathlib.Path(work) / "a.off.partial"):
+                wrong.touch()
+                with self.assertRaises(ValueError):
+                    polygons.read(wrong)
+        self.assertEqual(polygons.picture(corners, ([0, 0, 0], [2, 2, 2]))[:4], b"\x89PNG")
+        self.assertEqual(polygons.thin_share(corners, 0.1), 0)
+        self.assertEqual(polygons.thin_share(corners, 2.1), 1)
+
+
+class Protocol(unittest.TestCase):
+    def test_malformed_results(self):
+        with tempfile.TemporaryDirectory() as work:
+            file = pathlib.Path(work) / "result.json"
+            for text in ("", "[]", "{}", '{"status": "crash"}', '{"status": "done", "seconds": -1}',
+                         '{"status": "done", "claims": []}', '{"status": "done", "claims": {"valid": true}}',
+                         '{"status": "done", "claims": {"watertight": 1}}',
+                         '{"status": "done", "claims": {"distance_to_input": true}}',
+                         '{"status": "done", "claims": {"distance_to_input": NaN}}'):
+                file.write_text(text)
+                with self.assertRaises(ValueError, msg=text):
+                    protocol.read_result(file)
+            file.write_text('{"status": "done", "claims": {"manifold": null, "distance_to_input": 1}}')
+            self.assertEqual(protocol.read_result(file)["claims"], {"distance_to_input": 1})
+
+    def test_times(self):
+        def is_false(seconds, wall, cpu, mib=0.0):
+            return protocol.is_false_time(seconds, child.Ended("done", 0, cpu, 1.0, "", "", wall), mib)
+        with mock.patch("os.cpu_count", return_value=2):
+            self.assertFalse(is_false(1.0, 1.0, 1.0))
+            self.assertFalse(is_false(0.0, 3.0, 4.9))  # the start of an interpreter
+            self.assertFalse(is_false(10.0, 16.0, 29.0))  # two cores, and a start
+            self.assertFalse(is_false(0.1, 20.0, 20.0, mib=16))  # large files
+            self.assertTrue(is_false(1.1, 1.0, 1.0))
+            self.assertTrue(is_false(1.0, 20.0, 20.0))
+
 
 @unittest.skipUnless(HERMESH, "the environment variable HERMESH names no program")
 class Benchmark(unittest.TestCase):
+    def setUp(self):
+        folder = tempfile.TemporaryDirectory()
+        self.addCleanup(folder.cleanup)
+        self.work = pathlib.Path(folder.name)
+        self.said = []
+
+    def adapter(self, name, script):
+        file = self.work / f"{name}.py"
+        file.write_text(ADAPTER + script)
+        return {"name": name, "adapter": ["python3", str(file)]}
+
+    def run_methods(self, methods, models=(CUBE,), out="out", jobs=1, shard="", chosen=slice(None),
+                    **changes):
+        entries = []
+        for number, model in enumerate(models):
+            name = "model.obj" if model.startswith("v ") else "model.off"
+            entries.append(corpus.Entry("package", "1", name, f"{number}" * 64, "off", len(model), "none"))
+            path = corpus.location(entries[-1], self.work / "cache")
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_text(model)
+        experiment = {"question": "", "resolution": 20, "seed": 7, "seconds": 30, "memory_mib": 4096,
+                      "method": methods, **changes}
+        run = benchmark.Benchmark(experiment, HERMESH, self.work / out, self.said.append, shard)
+        return run.run(entries[chosen], self.work / "cache", jobs)
+
+    def test_false_claims_are_caught_and_true_ones_are_not(self):
+        topology = "watertight=True, manifold=True, intersection_free=True"
+        cases = {
+            "honest": ("start = time.monotonic(); write(CUBE); end(seconds=time.monotonic() - start, "
+                       f"claims=dict({topology}, distance_to_input=0, distance_from_input=0))", []),
+            "claims nothing": ("write(CUBE, 11); end()", []),
+            "honest shift": ("write(SHIFTED); end(claims=dict(distance_to_input=0.1, "
+                             "distance_from_input=0.1))", []),
+            "hole": (f"write(CUBE, 11); end(claims=dict({topology}))", ["watertight"]),
+            "near": ("write(SHIFTED); end(claims=dict(distance_to_input=0.01))", ["distance_to_input"]),
+            "complete": ("write(SHIFTED); end(claims=dict(distance_from_input=0.01))",
+                         ["distance_from_input"]),
+            "slow": ("write(CUBE); end(seconds=100)", ["seconds"]),
+            "fast": ("write(CUBE)\nwhile time.process_time() < 1: pass\nend(seconds=0.001)", ["seconds"])}
+        with mock.patch.object(protocol, "START_SECONDS", 0.5):
+            rows = self.run_methods([self.adapter(name, script) for name, (script, _) in cases.items()])
+        self.assertEqual({row["method"]: row.get("failed_claims", row) for row in rows},
+                         {name: failed for name, (_, failed) in cases.items()})
+        always, never = "100.0 [20.7, 100.0]", "0.0 [0.0, 79.3]"
+        self.assertIn(f"| hole | clean solid | 1 | {always} | {never} | {never} | {always} | ",
+                      rates.table(rows, list(cases)))
+
+    def test_claims_about_visible_points_ignore_enclosed_ones(self):
+        # A cube within the cube: a mesh of the outer one only.
+        small = [" ".join(str(0.5 + float(c) / 2) for c in line.split()) for line in CUBE.splitlines()[2:10]]
+        faces = [[int(i) for i in face.split()] for face in FACES.split(",")]
+        model = "\n".join(["OFF", "16 24 0", *CUBE.splitlines()[2:10], *small,
+                           *("3 %d %d %d" % (a + k, b + k, c + k) for k in (0, 8) for a, b, c in faces), ""])
+        outer = self.adapter("outer", "write(CUBE); end(claims=dict(distance_from_input=0.01))")
+        row, = self.run_methods([outer], [model])
+        self.assertEqual((row["status"], row["failed_claims"]), ("done", []))
+
+    def test_quads_may_be_split_either_way(self):
+        # One face is two triangles over a quad that is not flat; the claim holds for one diagonal.
+        points = CUBE.splitlines()[2:9] + ["2 2 3"]
+        quads = "0 2 3 1,4 5 7 6,0 1 5 4,2 6 7 3,0 4 6 2,1 3 7 5".split(",")
+        model = "\n".join(["OFF", "8 6 0", *points, *(f"4 {quad}" for quad in quads), ""])
+        split = ["3 {0} {1} {2}|3 {0} {2} {3}".format(*quad.split()) for quad in quads]
+        mesh = "\n".join(["OFF", "8 12 0", *points, *"|".join(split).split("|"), ""])
+        row, = self.run_methods([self.adapter("split", f"write({mesh!r}); end(claims=dict("
+                                              "distance_to_input=0.0, distance_from_input=0.0))")], [model])
+        self.assertEqual(row["failed_claims"], [])
+
+    def test_how_adapters_end(self):
+        methods = [self.adapter(name, script) for name, script in (
+            ("refuses", "end('refused', message='too thin')"), ("fails", "sys.exit('no licence')"),
+            ("paths", "sys.exit(request['input'] + ' ' + request['output'])"), ("silent", "pass"),
+            ("malformed", "write(CUBE); end(claims=dict(perfect=True))"), ("no mesh", "end()"),
+            ("crash", "os.abort()"),
+            ("absent", "print('no blender', file=sys.stderr); sys.exit(77)"))]
+        methods += [{"name": "no file", "adapter": ["python3", "reference/peers/absent.py"]},
+                    {"name": "no program", "request": ["hermesh-absent-program"]}]
+        rows = self.run_methods(methods, [CUBE, SHIFTED])
+        self.assertEqual([row["status"] for row in rows if row["sha256"] == "0" * 64],
+                         ["refused", "refused", "refused", "wrong output", "wrong output", "wrong output", "crash"])
+        self.assertEqual([row["message"] for row in rows][:4],
+                         ["too thin", "no licence", "model.off out.ply", "no result was written to request.result"])
+        absent = [line for line in self.said if "not installed" in line]
+        self.assertEqual(len(absent), 3)  # not of the second model
+        self.assertIn("no blender", absent[0])
+
+    def test_no_adapter_is_left_out_of_hard_models(self):
+        script = "sys.exit(77) if 'v 9' in open(request['input']).read() else end('refused')"
+        hard = "v 9 0 0\nv 0 0 0\nv 0 9 0\nv 0 0 9\nf 2 3 1\nf 2 1 4\nf 2 4 3\nf 1 3 4\n"
+        rows = self.run_methods([self.adapter("dodges", script)], [CUBE, hard])
+        self.assertEqual([row["status"] for row in rows], ["refused", "refused"])
+
+    def test_requests(self):
+        copy = self.adapter("copy", "end('refused', message=json.dumps([request, "
+                            "os.environ['HERMESH_INPUT'], os.environ.get('HERMESH_VOXEL_SIZE')]))")
+        for changes, resolution in (({}, 20), ({"error": 0.01}, None)):
+            row, = self.run_methods([copy], out=f"out{resolution}", **changes)
+            request, input_file, voxel = json.loads(row["message"])
+            self.assertEqual(input_file, "model.off")
+            expected = {"version": 1, "task": "remesh", "seed": 7, "threads": 1, "seconds": 30,
+                        "memory_mib": 4096, "resolution": resolution}
+            self.assertEqual(request | expected, request)
+            self.assertEqual(request["input"], input_file)
+            if resolution:
+                self.assertEqual((request["voxel_size"], voxel), (0.1, "0.1"))
+            else:
+                self.assertAlmostEqual(request["error"], 0.02 * 3**0.5)
+                self.assertIsNone(voxel)
+
+    def test_claims_of_requests(self):
+
+        request = ["{hermesh}", "remesh", "{input}", "{output}", "--voxel-size", "{voxel}"]
+        claims = {"watertight": True, "distance_to_input": "{voxel}"}
+        row, = self.run_methods([{"name": "remesh", "request": request, "claims": claims}])
+        self.assertEqual(row["claims"], {"watertight": True, "distance_to_input": 0.1})
+        self.assertEqual(row["failed_claims"], [])
+
+    def test_examples(self):
+        adapters = ROOT / "experiments/lab/adapters"
+        methods = [{"name": "hull", "adapter": ["python3", "experiments/lab/adapters/example.py"]}]
+        obj = "".join(f"v {line}\n" for line in CUBE.splitlines()[2:10]) \
+            + "".join("f %d %d %d\n" % tuple(int(i) + 1 for i in face.split()) for face in FACES.split(","))
+        if shutil.which("g++"):
+            subprocess.run(["g++", adapters / "example.cpp", "-o", self.work / "example"], check=True)
+            methods.append({"name": "box", "adapter": [str(self.work / "example")]})
+        for row in self.run_methods(methods, [obj]):
+            found = row["status"], row["watertight"], row["failed_claims"]
+            self.assertEqual(found, ("done", True, []), row)
+            self.assertLess(row["lost"], 1e-3)
+        for name in ("example.py", "example.cpp"):
+            self.assertLessEqual(len((adapters / name).read_text().splitlines()), 30)
+
+    def test_shards_and_jobs_make_the_same_rows(self):
+        methods = [self.adapter("cube", "write(CUBE); end(claims=dict(watertight=True))"),
+                   {"name": "refuses", "request": ["false"]}]
+        models = [CUBE, SHIFTED, CUBE + "\n"]
+        self.run_methods(methods, models, "whole")
+        self.run_methods(methods, models, "parts", 2, "-1-of-2", slice(0, None, 2))
+        self.run_methods(methods, models, "parts", 1, "-2-of-2", slice(1, None, 2))
+        self.assertEqual(len(list((self.work / "parts").glob("rows*.jsonl"))), 2)
+        self.assertEqual(rates.differences(self.work / "whole", self.work / "parts"), [])
+        self.said.clear()
+        rows = self.run_methods(methods, models, "parts")
+        self.assertEqual((len(rows), self.said), (6, []))
+        rates.write_report(rows, ["cube", "refuses", "absent"], {"cube"}, "Why?", self.work / "parts")
+        self.assertIn("Not installed, and left out: absent.", (self.work / "parts/table.md").read_text())
+        self.assertIn("<svg", (self.work / "parts/profiles.svg").read_text())
+        self.assertIn("data:image/png", (self.work / "parts/gallery.html").read_text())
+
     def test_rows_are_resumed_and_outputs_validated(self):
         with tempfile.TemporaryDirectory() as work:
             cache, out = pathlib.Path(work) / "cache", pathlib.Path(work) / "out"
@@ -70,12 +410,13 @@ class Benchmark(unittest.TestCase):
             path = corpus.location(entry, cache)
             path.parent.mkdir(parents=True)
             path.write_text(CUBE)
-            experiment = {"question": "", "resolution": 20, "seconds": 30, "memory_mib": 4096, "method": [
+            experiment = {"question": "", "resolution": 20, "seed": 1, "seconds": 30, "memory_mib": 4096}
+            experiment["method"] = [
                 {"name": "remesh",
                  "request": ["{hermesh}", "remesh", "{input}", "{output}", "--resolution", "{resolution}"]},
                 {"name": "no mesh", "request": ["cp", "{input}", "{output}"]},
                 {"name": "nothing", "request": ["true"]},
-                {"name": "refuses", "request": ["false"]}]}
+                {"name": "refuses", "request": ["false"]}]
             said = []
             rows = benchmark.Benchmark(experiment, HERMESH, out, said.append).run([entry], cache)
             self.assertEqual([r["status"] for r in rows], ["done", "wrong output", "wrong output", "refused"])
@@ -91,7 +432,7 @@ class Benchmark(unittest.TestCase):
             again = benchmark.Benchmark(experiment, HERMESH, out, said.append).run([entry], cache)
             self.assertEqual(len(said), 1)
             self.assertEqual([r["status"] for r in again], [r["status"] for r in rows])
-            text = benchmark.table(rows, ["remesh", "refuses"])
+            text = rates.table(rows, ["remesh", "refuses"])
             self.assertIn("| remesh | clean solid | 1 | 100.0", text)
             self.assertIn("| refuses | clean solid | 1 | 0.0", text)
 

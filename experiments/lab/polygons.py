@@ -1,0 +1,200 @@
+"""Polygons of mesh files (OBJ, OFF, PLY and STL, also gzipped): samples, rays and pictures of them."""
+
+import gzip
+import io
+import re
+
+import numpy
+from scipy.spatial import cKDTree
+
+UNIT_TRIANGLE = numpy.array([[1.0, 0, 0], [0, 1, 0], [0, 0, 1]])
+_TYPES = {"char": "i1", "uchar": "u1", "short": "i2", "ushort": "u2", "int": "i4", "uint": "u4",
+          "float": "f4", "double": "f8", "int8": "i1", "uint8": "u1", "int16": "i2", "uint16": "u2",
+          "int32": "i4", "uint32": "u4", "float32": "f4", "float64": "f8"}
+
+
+def read(path):
+    """Returns the corners of all triangles (n, 3, 3), polygons as fans, and which triangles are polygons (n).
+
+    Raises ValueError for other formats and for damaged files.
+    """
+    name = str(path).lower().removesuffix(".gz")
+    reader = next((r for end, r in ((".obj", _obj), (".off", _off), (".ply", _ply), (".stl", _stl))
+                   if name.endswith(end)), None)
+    if not reader:
+        raise ValueError(f"{path}: only OBJ, OFF, PLY and STL are read here")
+    try:
+        with (gzip.open if str(path).lower().endswith(".gz") else open)(path, "rb") as file:
+            points, fans, is_triangle = reader(file.read())
+        corners = numpy.asarray(points, float).reshape(-1, 3)[numpy.asarray(fans, int).reshape(-1, 3)]
+    except (LookupError, TypeError, OverflowError, StopIteration, EOFError, gzip.BadGzipFile) as error:
+        raise ValueError(f"{path}: the file is damaged: {error}") from None
+    if not len(corners) or not numpy.isfinite(corners).all():
+        raise ValueError(f"{path}: there are no polygons, or a coordinate is not finite")
+    return corners, numpy.broadcast_to(is_triangle, len(corners))
+
+
+def _fans(polygons):
+    """Returns the triangles of polygons, and which of them are polygons."""
+    fans = [(p[0], b, c, len(p) == 3) for p in polygons for b, c in zip(p[1:], p[2:])]
+    table = numpy.array(fans, int).reshape(-1, 4)
+    return table[:, :3], table[:, 3] == 1
+
+
+def _obj(data):
+    points, polygons = [], []
+    for line in data.decode(errors="replace").replace("\\\n", " ").splitlines():
+        words = line.split()
+        if words[:1] == ["v"]:
+            points.append([float(word) for word in words[1:4]])
+        elif words[:1] == ["f"]:
+            corners = [int(word.split("/")[0]) for word in words[1:]]
+            polygons.append([c - 1 if c > 0 else len(points) + c for c in corners])
+    return points, *_fans(polygons)
+
+
+def _off(data):
+    text = data.decode(errors="replace")
+    lines = [words for line in text.splitlines() if (words := line.split("#")[0].split())]
+    head = lines.pop(0)
+    if not head[0].endswith("OFF"):
+        raise ValueError("an OFF file starts with OFF")
+    points, faces = map(int, (head[1:] or lines.pop(0))[:2])
+    polygons = [list(map(int, words[1:int(words[0]) + 1])) for words in lines[points:points + faces]]
+    return [list(map(float, words[:3])) for words in lines[:points]], *_fans(polygons)
+
+
+def _stl(data):
+    count = int.from_bytes(data[80:84], "little") if len(data) >= 84 else 0
+    if len(data) >= 84 and len(data) == 84 + 50 * count:
+        record = [("normal", "<f4", 3), ("corners", "<f4", 9), ("attribute", "<u2")]
+        records = numpy.frombuffer(data, record, count, 84)
+        points = records["corners"].reshape(-1, 3)
+    else:
+        points = [words.split() for words in re.findall(rb"vertex\s+(\S+\s+\S+\s+\S+)", data)]
+    return numpy.array(points, float), numpy.arange(len(points)), True
+
+
+def _ply(data):
+    head, _, body = data.partition(b"end_header\n" if b"end_header\n" in data else b"end_header\r\n")
+    elements, order = [], "<"
+    for words in map(str.split, head.decode(errors="replace").splitlines()):
+        if words[:1] == ["format"] and words[1] != "ascii":
+            order = "<" if "little" in words[1] else ">"
+        elif words[:1] == ["format"]:
+            order = ""
+        elif words[:1] == ["element"]:
+            elements.append((words[1], int(words[2]), []))
+        elif words[:1] == ["property"]:
+            elements[-1][2].append((words[-1], words[1:-1]))
+    values = iter(body.split()) if not order else None
+    at = 0
+
+    def take(kind, count):
+        nonlocal at
+        if values is not None:
+            return [float(next(values)) for _ in range(count)]
+        found = numpy.frombuffer(body, order + _TYPES[kind], count, at)
+        at += found.nbytes
+        return found.tolist()
+
+    points, polygons = [], []
+    for name, count, properties in elements:
+        if order and all(len(kind) == 1 for _, kind in properties):  # without lists: all at once
+            record = [(label, order + _TYPES[kind[0]]) for label, kind in properties]
+            records = numpy.frombuffer(body, record, count, at)
+            at += records.nbytes
+            if name == "vertex":
+                points = numpy.stack([records[axis].astype(float) for axis in "xyz"], axis=1)
+            continue
+        if order and name == "face" and len(properties) == 1:  # all triangles: all at once
+            _, (_, length, kind) = properties[0]
+            record = numpy.dtype([("corners", order + _TYPES[length]), ("vertices", order + _TYPES[kind], 3)])
+            if len(body) - at >= count * record.itemsize:
+                records = numpy.frombuffer(body, record, count, at)
+                if (records["corners"] == 3).all():
+                    return points, records["vertices"], True
+        for _ in range(count):
+            row = {}
+            for label, kind in properties:
+                length = int(take(kind[1], 1)[0]) if len(kind) == 3 else 1
+                row[label] = take(kind[-1], length) if len(kind) == 3 else take(kind[0], 1)[0]
+            if name == "vertex":
+                points.append([row[axis] for axis in "xyz"])
+            elif name == "face":
+                polygons.append([int(v) for v in row.get("vertex_indices", row.get("vertex_index"))])
+    return points, *_fans(polygons)
+
+
+def normals(corners):
+    """Returns unit normals (0 for degenerate triangles) and areas."""
+    normal = numpy.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    length = numpy.linalg.norm(normal, axis=1)
+    return normal / numpy.maximum(length, 1e-300)[:, None], length / 2
+
+
+def samples(corners, count, seed=0):
+    """Returns points that are distributed uniformly over the area, and the numbers of their triangles."""
+    random, areas = numpy.random.default_rng(seed), normals(corners)[1]
+    if not areas.sum():
+        return numpy.empty((0, 3)), numpy.empty(0, int)
+    chosen = random.choice(len(corners), count, p=areas / areas.sum())
+    a, b = random.random((2, count))
+    a, b = numpy.where(a + b > 1, 1 - a, a), numpy.where(a + b > 1, 1 - b, b)
+    weights = numpy.stack([1 - a - b, a, b], axis=1)
+    return numpy.einsum("ij,ijk->ik", weights, corners[chosen]), chosen
+
+
+def first_hit(corners, origin, direction, after):
+    """Returns the distance along a ray to its first hit beyond the distance `after`, else infinity."""
+    start, edge1, edge2 = origin - corners[:, 0], *(corners[:, i] - corners[:, 0] for i in (1, 2))
+    p, q = numpy.cross(direction, edge2), numpy.cross(start, edge1)
+    with numpy.errstate(divide="ignore", invalid="ignore"):
+        inverse = 1 / numpy.einsum("ij,ij->i", edge1, p)
+        u, v = numpy.einsum("ij,ij->i", start, p) * inverse, q @ direction * inverse
+        t = numpy.einsum("ij,ij->i", edge2, q) * inverse
+        return t[(u >= 0) & (v >= 0) & (u + v <= 1) & (t > after)].min(initial=numpy.inf)
+
+
+def distant_visible_points(model, is_triangle, output, count=64, rays=16):
+    """Returns those of the model's most distant samples from the output from which two rays leave the model.
+
+    Samples are vertices and points within triangles, which do not depend on the triangulation of polygons.
+    """
+    within = samples(model[is_triangle], 20_000)[0]
+    points = numpy.unique(numpy.concatenate([model.reshape(-1, 3), within]), axis=0)
+    known = samples(output, 50_000)[0]
+    if not len(known):
+        return points[:0]
+    points = points[numpy.argsort(-cKDTree(known).query(points)[0])[:count]]
+    directions = numpy.random.default_rng(0).normal(size=(rays, 3))
+    directions /= numpy.linalg.norm(directions, axis=1)[:, None]
+    after = 1e-7 * numpy.ptp(model.reshape(-1, 3), axis=0).max()
+    free = [sum(numpy.isinf(first_hit(model, point, direction, after)) for direction in directions)
+            for point in points]
+    return points[numpy.array(free) >= 2]
+
+
+def thin_share(corners, voxel, count=200):
+    """Returns the share of the area from which a ray inwards meets the surface again within a voxel."""
+    points, chosen = samples(corners, count)
+    inwards = -normals(corners)[0][chosen]
+    hits = [first_hit(corners, p, d, 1e-4 * voxel) < voxel for p, d in zip(points, inwards)]
+    return float(numpy.mean(hits)) if hits else 0.0
+
+
+def picture(corners, box, pixels=160):
+    """Returns a PNG of the triangles, seen diagonally from above; `box` (lower, upper) fills the frame."""
+    import matplotlib.image
+    centre, longest = numpy.mean(box, axis=0), numpy.linalg.norm(numpy.subtract(*box)) or 1.0
+    right, up = numpy.array([0.8, -0.6, 0]), numpy.array([0.36, 0.48, 0.8])
+    towards = numpy.cross(right, up)
+    points, chosen = samples(corners, 8 * pixels**2)
+    shade = 0.25 + 0.75 * abs(normals(corners)[0][chosen] @ (0.3 * right + 0.5 * up + 0.8 * towards))
+    x, y = (((points - centre) @ axis / longest * 0.98 + 0.5) * pixels for axis in (right, -up))
+    order = numpy.argsort((points - centre) @ towards)
+    order = order[(x[order] >= 0) & (x[order] < pixels) & (y[order] >= 0) & (y[order] < pixels)]
+    image, png = numpy.ones((pixels, pixels)), io.BytesIO()
+    image[y[order].astype(int), x[order].astype(int)] = 0.85 * shade[order].clip(0, 1)
+    matplotlib.image.imsave(png, image, cmap="gray", vmin=0, vmax=1, format="png")
+    return png.getvalue()
