@@ -79,7 +79,8 @@ class Thickening {
     Need result;
     Vector3d inwards = -outwards;
     double wall = kNone, gap = kNone;
-    if (behind.faces_away) {
+    // A wall is not thin if the solid is thick behind it, e.g. where the cavity that it encloses is filled.
+    if (behind.faces_away && (is_lost || !shown.is_all(true, at - outwards))) {
       wall = behind.distance;
       if (ahead.faces_here) gap = ahead.distance;
     } else if (is_thick(at, outwards, shown)) {
@@ -98,6 +99,8 @@ class Thickening {
       else if (mode == Mode::boundaries)
         radius = std::max(radius, radius_at_boundary(piece, within));
       result.radius = std::max(0.0, radius - 0.5 * wall);
+      // The shell of a piece that is shown must not close the gap in front of it.
+      if (!is_lost && ahead.faces_here && ahead.distance - 2.0 * result.radius < kWideGap) return {};
       // The wall is thick enough for the samples, but not part of the solid, e.g. between two open surfaces.
       if (is_lost && !(result.radius > 0.0) && shown.is_all(false, at + within)) {
         result.radius = 0.5 * wall;
@@ -110,6 +113,16 @@ class Thickening {
       result.is_gap = true;
     }
     return result;
+  }
+
+  /// Returns true if a piece bounds space that the solid fills, i.e. a cavity or a narrow gap: the piece is
+  /// inside the solid.
+  bool bounds_filled_space(const Vector3d& at, const Vector3d& normal, std::uint32_t triangle,
+                           const ShownSurface& shown) const {
+    const Vector3d outwards = turn(triangle) * normal;
+    const Opposite ahead = across(at, outwards)[0];
+    const double middle = ahead.faces_here ? std::min(1.0, 0.5 * ahead.distance) : 1.0;
+    return shown.is_all(true, at + middle * outwards);
   }
 
   /// Returns true if a piece is part of a wall that is thinner than a voxel, or of an open surface if these
@@ -351,8 +364,9 @@ class ShellMaker {
     const ShownSurface::Verdict verdict = verdicts_[piece_++];
     // A piece near a lost one may be shown, because it bounds a thick part of the solid.
     if (verdict == ShownSurface::Verdict::hidden || !Near::holds(around_, centre(c))) return {};
-    const Thickening::Need need =
-        thickening_.need(c, normal_, triangle_, verdict == ShownSurface::Verdict::lost, mode_, shown_);
+    const bool is_lost = verdict == ShownSurface::Verdict::lost;
+    if (is_lost && thickening_.bounds_filled_space(centre(c), normal_, triangle_, shown_)) return {};
+    const Thickening::Need need = thickening_.need(c, normal_, triangle_, is_lost, mode_, shown_);
     if (!(need.radius > 0.0)) return {};
     const double area = area_of(c);
     (need.is_gap ? part.merged_area : part.thickened_area) += area;
@@ -427,9 +441,12 @@ std::optional<ThinParts> thicken(const PolygonMesh& mesh, SampledSolid& solid, T
   const Stage stage(context, "thin parts");
   const std::vector<Triangle> triangles = triangulated(mesh);
   const ShownSurface shown(solid.level_set, solid.hermite, mesh.origin, context);
-  const SurfaceComparison comparison = compare_with_solid(mesh, shown, voxel_size, context);
+  SurfaceComparison comparison = compare_with_solid(mesh, shown, voxel_size, context);
   if (comparison.lost.empty() && comparison.pierced.empty()) return std::nullopt;
   const Thickening thickening(mesh, voxel_size);
+  std::erase_if(comparison.lost, [&](const LostPiece& piece) {
+    return thickening.bounds_filled_space(piece.at, piece.normal, piece.triangle, shown);
+  });
   std::vector<Vector3d> lost = worth_a_shell(comparison, shown, thickening);
   // The boundary of a narrow hole shows the polygons within it.
   for (const LostPiece& piece : comparison.pierced)

@@ -222,6 +222,32 @@ TEST(ThinParts, AreNotAddedWhereThereAreNone) {
   }
 }
 
+TEST(ThinParts, DoNotCloseGapsBesideThem) {
+  // Plates of 1.15 with gaps of 0.85 between them, in each of which is a layer of samples, and a sheet that
+  // connects their ends: only the sheet is lost, and its shell leaves the gaps open.
+  MeshFile model;
+  const auto add = [&](const PolygonMesh& polygons) {
+    const MeshFile file = to_mesh_file(polygons);
+    const auto first = static_cast<std::uint32_t>(model.points.size());
+    model.points.insert(model.points.end(), file.points.begin(), file.points.end());
+    for (const Triangle& t : file.triangles)
+      model.triangles.push_back({first + t[0], first + t[1], first + t[2]});
+  };
+  for (int i = 0; i < 6; ++i) add(test_solids::cuboid({2 * i + 0.425, 0.3, 0.3}, {1.15, 6.1, 12.3}));
+  MeshFile sheet;
+  sheet.points = {{-1, 6.4, 0.3}, {13, 6.4, 0.3}, {13, 6.4, 12.6}, {-1, 6.4, 12.6}};
+  sheet.triangles = {{0, 1, 2}, {0, 2, 3}};
+  add(to_polygon_mesh(sheet));
+  RunContext context;
+  const Kept kept = keep(to_polygon_mesh(model), context);
+  ASSERT_TRUE(kept.solid.thin);
+  const MeshFile file = to_mesh_file(kept.mesh);
+  const validation::VisibleLoss loss = validation::measure_visible_loss(
+      validation::TriangleSoup(model), validation::TriangleSoup(file), 1.0, 20'000, context);
+  EXPECT_LE(loss.filled.value, 0.001);
+  EXPECT_LE(loss.lost.value, 0.02);
+}
+
 TEST(ThinParts, AreRefusedIfAskedFor) {
   RunContext context;
   EXPECT_THROW(keep(wall(surfaces()[0], 0.0), context, ThinRule::refuse), Error);
