@@ -164,6 +164,14 @@ class Frustum:
         ...
 
 
+class Thin:
+    keep: Thin
+    drop: Thin
+    refuse: Thin
+    name: str
+    value: int
+
+
 class VoxelizeOptions:
     resolution: int | None
     voxel_size: float | None
@@ -172,6 +180,7 @@ class VoxelizeOptions:
     interior_band: float
     voxelizer: str
     options: dict[str, str]
+    thin: Thin | None
 
 
 class ExtractOptions:
@@ -306,7 +315,7 @@ def remesh(mesh: Mesh, voxelizing: VoxelizeOptions, extracting: ExtractOptions, 
 
 
 def remesh_within(mesh: Mesh, error: float | None, triangles: int | None, signs: str, over_holes: bool,
-                  smallest_voxel: float, limit_points: float, written_in_single: bool, watch: Watch,
+                  smallest_voxel: float, limit_points: float, written_in_single: bool, thin: Thin, watch: Watch,
                   /) -> tuple[Mesh, float, float, float, float]:
     ...
 

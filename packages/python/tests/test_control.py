@@ -30,7 +30,7 @@ class Control(unittest.TestCase):
             threads.add(threading.get_ident())
 
         log = hermesh.Log()
-        hermesh.remesh(torus(), resolution=60, progress=progress, log=log)
+        hermesh.remesh(torus(), resolution=60, thin="drop", progress=progress, log=log)
         self.assertEqual(threads, {threading.get_ident()})
         self.assertTrue(all(0 <= fraction <= 1 for _, fraction in seen))
         stages = {stage for stage, _ in log.stage_seconds}
