@@ -26,6 +26,7 @@ interruption. Meshes are validated with `hermesh validate`, which shares no code
 """
 
 import contextlib
+import datetime
 import functools
 import json
 import math
@@ -359,6 +360,14 @@ def add_command(subparsers):
     parser.set_defaults(function=run)
 
 
+def _provenance(hermesh):
+    """Returns the date, the build of the program that validates, and the processor, as text."""
+    version = child.run([hermesh, "--version"], VALIDATION).output.splitlines()
+    with open("/proc/cpuinfo") as file:
+        names = [line.partition(":")[2].strip() for line in file if line.startswith("model name")]
+    return ", ".join([f"{datetime.date.today()}", *version[:2], *names[:1], f"{len(names)} cores"])
+
+
 def _parse_shard(text):
     try:
         number, count = map(int, text.split("/"))
@@ -404,10 +413,12 @@ def run(arguments):
         entries, shard = entries[number - 1::count], f"-{number}-of-{count}"
     corpus.fetch(entries, cache, say)
     out = arguments.out or ROOT / "results/local" / file.stem
-    benchmark = Benchmark(experiment, os.path.abspath(arguments.hermesh), out, say, shard)
+    hermesh = os.path.abspath(arguments.hermesh)
+    benchmark = Benchmark(experiment, hermesh, out, say, shard)
     rows = benchmark.run(entries, cache, arguments.jobs)
     ours = {m["name"] for m in experiment["method"] if m["name"].startswith("hermesh")}
-    rates.write_report(rows, [m["name"] for m in experiment["method"]], ours, experiment["question"], out)
+    rates.write_report(rows, [m["name"] for m in experiment["method"]], ours, experiment["question"], out,
+                       _provenance(hermesh))
     print((out / "table.md").read_text())
     say(f"Table, profiles and worst cases: {out}/table.md, profiles.svg, gallery.html")
     return 0

@@ -164,12 +164,14 @@ def gallery(rows, ours, question, pictures):
         methods=sorted({case["method"] for case in cases}))
 
 
-def write_report(rows, methods, ours, question, out):
+def write_report(rows, methods, ours, question, out, provenance=""):
     """Writes table.md, profiles.svg and gallery.html."""
     if not rows:
         raise LabError(f"{out}: no method has a row; none of the programs is installed")
     out = pathlib.Path(out)
     text = [question, "", table(rows, methods)]
+    if provenance:
+        text += ["", f"Report of {provenance}."]
     if missing := [name for name in methods if not any(row["method"] == name for row in rows)]:
         text += ["", f"Not installed, and left out: {'; '.join(missing)}."]
     (out / "table.md").write_text("\n".join(text) + "\n")
