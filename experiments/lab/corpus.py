@@ -188,7 +188,8 @@ class _Package:
             content.seek(0)
             self._archives[outer] = zipfile.ZipFile(content) if is_zip else tarfile.open(fileobj=content)
         archive = self._archives[outer]
-        return archive.read(inner) if isinstance(archive, zipfile.ZipFile) else archive.extractfile(inner).read()
+        is_zip = isinstance(archive, zipfile.ZipFile)
+        return archive.read(inner) if is_zip else archive.extractfile(inner).read()
 
 
 def _unpack(deb, entries, cache, work):
@@ -199,8 +200,8 @@ def _unpack(deb, entries, cache, work):
         except (KeyError, AttributeError):
             raise LabError(f"{deb.name} has no file {entry.path}") from None
         if hashlib.sha256(content).hexdigest() != entry.sha256:
-            raise LabError(f"{deb.name}: the SHA-256 of {entry.path} differs from the corpus, which is of version "
-                              f"{entry.version}")
+            raise LabError(f"{deb.name}: the SHA-256 of {entry.path} differs from that of version "
+                           f"{entry.version}, which the corpus names")
         target = location(entry, cache)
         target.parent.mkdir(parents=True, exist_ok=True)
         if entry.format == "gltf":

@@ -28,8 +28,8 @@ def run(arguments):
         print(f"  {each['name']:<23} {each['question']}")
         if each["shows"]:
             print(f"  {'':<23} also called {', '.join(each['shows'])}")
-    print("\ncases (inputs that experiments name); the files of a private case have no public source: without them in "
-          "$HERMESH_DATA, a stand-in of the same size replaces it")
+    print("\ncases (inputs that experiments name); the files of a private case have no public source: without "
+          "them in $HERMESH_DATA, a stand-in of the same size replaces it")
     for case in cases():
         print(f"  {case['name']:<23} {case['summary']} [{case['kind']}{', private' * case['private']}]")
     return 0

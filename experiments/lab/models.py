@@ -24,7 +24,8 @@ def catalogue():
 def package_sizes():
     """Returns the bytes to download by kind and name of the package."""
     with open(EXPERIMENTS / "data/packages.tsv", newline="") as file:
-        return {(row["kind"], row["package"]): int(row["bytes"]) for row in csv.DictReader(file, delimiter="\t")}
+        rows = csv.DictReader(file, delimiter="\t")
+        return {(row["kind"], row["package"]): int(row["bytes"]) for row in rows}
 
 
 def kind_of(case):
@@ -32,7 +33,7 @@ def kind_of(case):
 
 
 def _base(name):
-    """Returns the case, or the case that it is made from, as cases.toml states it; {} for the path of a file."""
+    """Returns the case, or the case that it is made from, as in cases.toml; {} for the path of a file."""
     case = catalogue().get(name, {})
     return catalogue().get(case.get("close_holes_of") or case.get("agree_faces_of"), case)
 
@@ -46,7 +47,7 @@ def _stand_in(name):
 
 
 def is_private(name):
-    """Returns True for a case whose files have no public source, so that only $HERMESH_DATA can provide them."""
+    """Returns True for a case whose files have no public source: only $HERMESH_DATA can provide them."""
     return bool(_files(name)) and not any("from" in file for file in _files(name))
 
 
@@ -57,12 +58,13 @@ def _package(file):
 
 def _is_available(name):
     directories = filter(None, [os.environ.get("HERMESH_DATA"), corpus.cache_root()])
-    return any(pathlib.Path(directory, file["file"]).exists() for directory in directories for file in _files(name))
+    return any(pathlib.Path(directory, file["file"]).exists()
+               for directory in directories for file in _files(name))
 
 
 def fetch(names, say):
-    """Downloads the packages that hold the named cases, unless their files are available; calls `say` with the
-    size first and with the cases that stand-ins will replace.
+    """Downloads the packages that hold the named cases, unless their files are available; calls `say` with
+    the size first and with the cases that stand-ins will replace.
 
     Returns why packages could not be downloaded, or "".
     """
@@ -95,6 +97,8 @@ def fetch(names, say):
 
 def _fetch_file(name):
     """Returns why a file, and all others of its package, could not be downloaded, or ""."""
-    got = subprocess.run(["bash", EXPERIMENTS / "fetch_data.sh", name, corpus.cache_root()], stdin=subprocess.DEVNULL,
-                         capture_output=True, text=True)
-    return "" if got.returncode == 0 else (got.stderr.strip().splitlines() or [f"{name} could not be downloaded"])[-1]
+    got = subprocess.run(["bash", EXPERIMENTS / "fetch_data.sh", name, corpus.cache_root()],
+                         stdin=subprocess.DEVNULL, capture_output=True, text=True)
+    if got.returncode == 0:
+        return ""
+    return (got.stderr.strip().splitlines() or [f"{name} could not be downloaded"])[-1]

@@ -1,21 +1,24 @@
 #!/usr/bin/env bash
-# Installs what the peers need (README.md): Debian's packages, and the npm packages of package-lock.json into node_modules here.
-# What cannot be installed is named, and the others go on; experiments/questions/meshes/peers.toml notes an absent peer.
+# Installs the packages that the peers need (README.md): Debian packages, and the npm packages of
+# package-lock.json into node_modules in this directory. A package that cannot be installed is reported, and
+# the others are installed; experiments note an absent peer. --small leaves out Blender (430 MB), MeshLab,
+# Open3D and the peers that are linked with VTK and OpenMesh.
 set -u
 cd "$(dirname "$0")"
 
-# One by one, because what a distribution has of these differs. Blender is the largest, with 430 MB on disk.
-for package in libcgal-dev libopenmesh-dev libvtk9-dev python3-skimage python3-openvdb python3-open3d blender nodejs \
-  assimp-utils python3-vtk9 meshlab xvfb xauth; do
+packages=(libcgal-dev python3-openvdb python3-vtk9 assimp-utils nodejs npm)
+[ "${1:-}" = --small ] || packages+=(libopenmesh-dev libvtk9-dev python3-skimage python3-open3d blender meshlab xvfb xauth)
+# One by one, because their availability differs between distributions.
+for package in "${packages[@]}"; do
   dpkg-query -W -f='${Status}' "$package" 2>/dev/null | grep -q 'ok installed' && continue
   echo "Installing $package"
   DEBIAN_FRONTEND=noninteractive apt-get install -y --no-install-recommends "$package" >/dev/null 2>&1 ||
-    echo "absent: $package could not be installed; apt-get install $package says why" >&2
+    echo "absent: $package could not be installed; run apt-get install $package for the reason" >&2
 done
 
 if command -v npm >/dev/null; then
   npm ci --omit=optional --no-audit --no-fund --silent || echo "absent: the npm packages could not be installed" >&2
 else
-  echo "absent: there is no npm, and so no meshoptimizer and manifold-3d" >&2
+  echo "absent: npm is not installed, so meshoptimizer and manifold-3d are not available" >&2
 fi
-echo "Then: cmake --preset release && ninja -C build/release peers"
+[ "${1:-}" = --small ] || echo "Next: cmake --preset release && ninja -C build/release peers"
