@@ -99,8 +99,6 @@ class Thickening {
       else if (mode == Mode::boundaries)
         radius = std::max(radius, radius_at_boundary(piece, within));
       result.radius = std::max(0.0, radius - 0.5 * wall);
-      // The shell of a piece that is shown must not close the gap in front of it.
-      if (!is_lost && ahead.faces_here && ahead.distance - 2.0 * result.radius < kWideGap) return {};
       // The wall is thick enough for the samples, but not part of the solid, e.g. between two open surfaces.
       if (is_lost && !(result.radius > 0.0) && shown.is_all(false, at + within)) {
         result.radius = 0.5 * wall;
@@ -108,6 +106,8 @@ class Thickening {
       }
       result.wall = wall;
     }
+    // A gap in front of a piece that is shown stays open.
+    if (!is_lost && ahead.faces_here && ahead.distance - 2.0 * result.radius < kWideGap) return {};
     if (gap < kWideGap && 0.5 * gap > result.radius) {
       result.radius = 0.5 * gap + kOff;
       result.is_gap = true;
