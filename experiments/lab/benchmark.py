@@ -1,10 +1,12 @@
-"""A benchmark of remeshing programs on a corpus of models: one row per model and program.
+"""A benchmark of programs on a corpus of models: one row per model and program.
 
 An experiment file (TOML) has these keys:
 
 base        another file with some of these keys, which this one replaces; its methods follow (optional)
 question    one sentence
+task        "remesh" (default), or "simplify", which requires an error
 corpus      table of files in experiments/data
+classes     classes of models to take; all if absent
 models      number of files, "all", or numbers by tier: {quick = 60, full = 500}
 sample      "random" with the seed (default), or "listed": the first of the column `order` of the corpus
 seed        of the sample, and of the programs
@@ -48,7 +50,7 @@ VALIDATION = child.Limits(seconds=600, memory_mib=16_384)
 DEFECTS = ("boundary_edges", "non_manifold_edges", "non_manifold_vertices", "inconsistent_edges",
            "inside_out_components", "self_intersecting_pairs")
 REQUIRED = {"question", "corpus", "models", "seed", "resolution", "seconds", "memory_mib", "method"}
-OPTIONAL = {"sample", "error", "threads"}
+OPTIONAL = {"sample", "error", "threads", "task", "classes"}
 
 
 def _read_with_base(path):
@@ -69,6 +71,10 @@ def read_experiment(path):
     allowed = {"name", "request"}, {"name", "request", "claims"}, {"name", "adapter"}
     if any(method.keys() not in allowed for method in experiment["method"]):
         raise LabError(f"{path}: a [[method]] has a name, and an adapter or a request with optional claims")
+    if (task := experiment.get("task", "remesh")) not in protocol.TASKS:
+        raise LabError(f"{path}: unknown task '{task}'; expected {', '.join(protocol.TASKS)}")
+    if task == "simplify" and "error" not in experiment:
+        raise LabError(f"{path}: the task simplify requires an error")
     return experiment
 
 
@@ -124,6 +130,7 @@ class Benchmark:
     def __init__(self, experiment, hermesh, out, say, shard=""):
         self.experiment, self.hermesh, self.out = experiment, hermesh, pathlib.Path(out)
         self.shard, self._say = shard, say
+        self.task = experiment.get("task", "remesh")
         self.out.mkdir(parents=True, exist_ok=True)
         self.limits = child.Limits(experiment["seconds"], experiment["memory_mib"])
 
@@ -228,7 +235,7 @@ class Benchmark:
         if "error" in experiment:
             goal = {"error": experiment["error"] * model["diagonal"], "resolution": None}
         file, request, environment = protocol.write_request(
-            work, input=str(path), **goal, seed=experiment["seed"], threads=experiment.get("threads", 1),
+            work, task=self.task, input=str(path), **goal, seed=experiment["seed"], threads=experiment.get("threads", 1),
             seconds=experiment["seconds"], memory_mib=experiment["memory_mib"])
         words = {"hermesh": self.hermesh, "voxel": voxel, **request, "resolution": experiment["resolution"]}
         command = [word.format(**words) for word in method.get("request") or method["adapter"]]
@@ -262,9 +269,10 @@ class Benchmark:
         else:
             claims = {name: float(value.format(**words)) if isinstance(value, str) else value
                       for name, value in claims.items()}
-        return self._validate(row, model, path, request["output"], voxel, claims, seconds, ended)
+        return self._validate(row, model, path, request, voxel, claims, seconds, ended)
 
-    def _validate(self, row, model, path, output, voxel, claims, seconds, ended):
+    def _validate(self, row, model, path, request, voxel, claims, seconds, ended):
+        output = request["output"]
         reason = []
         report = self._ask("validate", output, "--reference", str(path), "--voxel-size", repr(voxel),
                            "--samples", "20000", "--solid-samples", "0", reason=reason)
@@ -280,12 +288,15 @@ class Benchmark:
                 raise LabError(f"the output cannot be validated with the reference {reference} {options}")
             return found
 
-        visible, defects = report["visible_loss"], {key: report[key] for key in DEFECTS if report[key]}
+        defects = {key: report[key] for key in DEFECTS if report[key]}
         row.update(triangles=report["triangles"] + 2 * report["quads"], components=report["components"],
-                   watertight=not defects, defects=defects, claims=claims, failed_claims=[],
-                   # Without visible surface, the shares are undefined and nothing is lost.
-                   **{share: visible[f"{share}_share"]["value"] or 0.0
-                      for share in ("lost", "vanished", "filled", "invented")})
+                   watertight=not defects, defects=defects, claims=claims, failed_claims=[])
+        if self.task == "simplify":
+            row["distance"] = protocol.share_of_error(report, request["error"], model["largest_coordinate"],
+                                                      ask, path)
+        else:  # without visible surface, the shares are undefined and nothing is lost
+            row |= {share: report["visible_loss"][f"{share}_share"]["value"] or 0.0
+                    for share in ("lost", "vanished", "filled", "invented")}
         if seconds is not None:
             row["seconds"] = seconds
         mib = (os.path.getsize(path) + os.path.getsize(output)) / child.MIB
@@ -396,7 +407,9 @@ def run(arguments):
         experiment["method"] = [m for m in experiment["method"] if m["name"] in arguments.method]
     models = experiment["models"]
     models = arguments.models or (models[arguments.tier] if isinstance(models, dict) else models)
-    entries = corpus.read_corpus(ROOT / "experiments/data" / experiment["corpus"])
+    classes = experiment.get("classes", rates.CLASSES)
+    entries = [e for e in corpus.read_corpus(ROOT / "experiments/data" / experiment["corpus"])
+               if not e.kind or e.kind in classes]
     choose = corpus.listed if (arguments.sample or experiment.get("sample")) == "listed" else corpus.sample
     entries, shard = choose(entries, models, experiment["seed"]), ""
     if arguments.shard:
@@ -407,7 +420,8 @@ def run(arguments):
     benchmark = Benchmark(experiment, os.path.abspath(arguments.hermesh), out, say, shard)
     rows = benchmark.run(entries, cache, arguments.jobs)
     ours = {m["name"] for m in experiment["method"] if m["name"].startswith("hermesh")}
-    rates.write_report(rows, [m["name"] for m in experiment["method"]], ours, experiment["question"], out)
+    rates.write_report(rows, [m["name"] for m in experiment["method"]], ours, experiment["question"], out,
+                       benchmark.task)
     print((out / "table.md").read_text())
     say(f"Table, profiles and worst cases: {out}/table.md, profiles.svg, gallery.html")
     return 0

@@ -127,6 +127,16 @@ class Rates(unittest.TestCase):
         self.assertEqual(line[:3], ["| a", "all meshes", "4"])
         self.assertEqual([cell.split()[0] for cell in line[3:8]], ["75.0", "50.0", "25.0", "50.0", "33.3"])
 
+    def test_table_of_simplification(self):
+        rows = [row_of(distance=0.5), row_of(sha="2", distance=1.5), row_of(sha="3", status="refused")]
+        text = rates.table(rows, ["a"], "simplify").splitlines()
+        line = dict(zip(text[0].split(" | "), text[-1].split(" | ")))
+        self.assertTrue(line["valid and within the bound %"].startswith("33.3 "))
+        self.assertTrue(line["over the bound %"].startswith("50.0 "))
+        self.assertEqual((line["median % of the bound"], line["median % of the model's triangles"]),
+                         ("100", "833.3"))
+        self.assertEqual(rates.trouble(rows[1])[1], "1.50 times the bound")
+
     def test_profile(self):
         # b takes twice as long as a on model 1, half as long on model 2; only a solves 3, no method solves 4.
         rows = [row_of("a", "1"), row_of("b", "1", cpu_seconds=2), row_of("a", "2", cpu_seconds=4),
@@ -167,7 +177,7 @@ class Rates(unittest.TestCase):
 
 class Experiments(unittest.TestCase):
     def test_files_of_the_project(self):
-        for file in (ROOT / "experiments/lab/questions").glob("wild*.toml"):
+        for file in (ROOT / "experiments/lab/questions").glob("*.toml"):
             self.assertIn("method", benchmark.read_experiment(file))
 
     def test_methods(self):
@@ -183,6 +193,12 @@ class Experiments(unittest.TestCase):
                 with self.subTest(method) if is_right else self.assertRaises(LabError):
                     benchmark.read_experiment(file)
             file.write_text(head + 'request = ["a"]')
+            for task, is_right in (('task = "simplify"\nerror = 0.1', True), ('task = "simplify"', False),
+                                   ('task = "paint"', False)):
+                other = pathlib.Path(work) / "c.toml"
+                other.write_text(f'base = "a.toml"\n{task}')
+                with self.subTest(task) if is_right else self.assertRaises(LabError):
+                    benchmark.read_experiment(other)
             other = pathlib.Path(work) / "b.toml"
             other.write_text('base = "a.toml"\nresolution = 5')
             self.assertEqual(benchmark.read_experiment(other)["resolution"], 5)
@@ -362,6 +378,19 @@ class Benchmark(unittest.TestCase):
             else:
                 self.assertAlmostEqual(request["error"], 0.02 * 3**0.5)
                 self.assertIsNone(voxel)
+
+    def test_simplification_is_measured_against_the_bound(self):
+        scripts = {"copy": "write(CUBE); end(claims=dict(distance_from_input=request['error']))",
+                   "far": "write(SHIFTED); end()",
+                   "false": "write(SHIFTED); end(claims=dict(distance_to_input=request['error']))",
+                   "asked": "end('refused', message=request['task'])"}
+        rows = self.run_methods([self.adapter(*script) for script in scripts.items()], task="simplify",
+                                error=0.01)
+        self.assertEqual(rows[3]["message"], "simplify")
+        self.assertEqual([row["failed_claims"] for row in rows[:3]], [[], [], ["distance_to_input"]])
+        self.assertEqual(rows[0]["distance"], 0)
+        self.assertGreater(rows[1]["distance"], 0.1 / (0.02 * 3**0.5))
+        self.assertEqual([row["near"] for row in rates.counted(rows)], [True, False, False, False])
 
     def test_claims_of_requests(self):
 

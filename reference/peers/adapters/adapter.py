@@ -59,6 +59,12 @@ def node(script):
     return [program("node", "install the package nodejs"), "--disable-wasm-trap-handler", PEERS / script]
 
 
+def peer_program(name):
+    """Returns the path of a peer in C++, in $HERMESH_PEERS or build/release/reference/peers."""
+    directory = os.environ.get("HERMESH_PEERS", f"{BUILD}/reference/peers")
+    return program(f"{directory}/{name}", "build the target peers")
+
+
 def length(request):
     """Returns the voxel size, which is the requested error for programs without an error bound."""
     return request.get("voxel_size") or request["error"]
