@@ -6,7 +6,7 @@ import os
 
 from . import polygons
 
-TASKS = ("remesh", "simplify")
+TASKS = ("remesh", "simplify", "combine")
 NOT_INSTALLED = 77  # exit code of an adapter whose program is not installed
 # Counts of `hermesh validate` that must be 0.
 CLAIMS = {"watertight": ("boundary_edges", "inconsistent_edges"),
@@ -75,7 +75,7 @@ def failed_claims(claims, seconds, ended, mib, report, scale, ask, model, output
     failed = [name for name, counts in CLAIMS.items() if claims.get(name) and any(map(report.get, counts))]
     for name, key in DISTANCES.items():
         limit = claims.get(name, math.inf) * (1 + SLACK) + ROUNDING * scale
-        if distance(report, key, limit, ask, model) > limit \
+        if key in report and distance(report, key, limit, ask, model) > limit \
                 and (key == "to_reference" or visible_distance(ask, model, output, scale) > limit):
             failed.append(name)
     return failed + (["seconds"] if seconds is not None and is_false_time(seconds, ended, mib) else [])

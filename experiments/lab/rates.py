@@ -12,14 +12,15 @@ import numpy
 from scipy.stats import binomtest
 
 from . import plots
-from .corpus import SIZES, size_group
+from .corpus import OPERATIONS, SIZES, size_group
 from .rows import LabError
 
 CLASSES = ["clean solid", "closed, self-intersecting", "closed, non-manifold or doubled", "few holes",
            "open sheets", "flat", "no mesh"]
-TAGS = ["several bodies", "thinner than a voxel"]
+TAGS = ["several bodies", "thinner than a voxel", "input not clean"]
 LOSS = INVENTED = 0.01  # shares of the visible surface, and of the output, above which they count
-NEAR = {"remesh": "valid and near %", "simplify": "valid and within the bound %"}
+NEAR = {"remesh": "valid and near %", "simplify": "valid and within the bound %",
+        "combine": "valid and right %"}
 WORST = 300  # cases in the gallery
 VARYING = {"cpu_seconds", "wall_seconds", "seconds", "peak_mib"}  # from day to day
 
@@ -33,9 +34,11 @@ def rate(count, of):
 
 
 def is_near(row):
-    """Returns True if a mesh is near the model: within the bound of a simplification, else without losses."""
+    """Returns True if a mesh is near the model, within the bound of a simplification, or the right solid."""
     if "distance" in row:
         return row["distance"] <= 1
+    if "wrong" in row:
+        return row["wrong"] <= LOSS
     return row["lost"] <= LOSS and row["invented"] <= INVENTED
 
 
@@ -55,7 +58,7 @@ def counted(rows):
 def _groups(rows):
     """Yields the name and the rows of each class, tag and size that has some, and of all meshes."""
     meshes = [row for row in rows if row["class"] != "no mesh"]
-    groups = {name: [row for row in rows if row["class"] == name] for name in CLASSES}
+    groups = {name: [row for row in rows if row["class"] == name] for name in [*CLASSES, *OPERATIONS]}
     groups |= {name: [row for row in meshes if name in row["tags"].split(", ")] for name in TAGS}
     groups |= {name: [row for row in meshes if size_group(row["model_triangles"]) == name]
                for name in SIZES.values()}
@@ -70,6 +73,22 @@ def _share_above(key, limit):
     return lambda made: rate(sum(row[key] > limit for row in made), len(made))
 
 
+def volume_errors(made):
+    """Returns by how much |A| + |B| = |A ∪ B| + |A ∩ B| and |A| = |A ∖ B| + |A ∩ B| fail, as shares of
+    |A| + |B|, of each pair for which a method made both meshes.
+    """
+    found, errors = collections.defaultdict(dict), []
+    for row in made:
+        found[row["pair"]][row["class"]] = row
+    for rows in found.values():
+        for operation in {"union", "difference"} & rows.keys() if "intersection" in rows else ():
+            first, second = rows[operation]["volumes"]
+            expected = first + second if operation == "union" else first
+            error = rows[operation]["volume"] + rows["intersection"]["volume"] - expected
+            errors.append(abs(error) / (first + second))
+    return errors
+
+
 # Columns of a task: values of the meshes of a method.
 COLUMNS = {
     "remesh": {f"loss > {LOSS:.0%}": _share_above("lost", LOSS),
@@ -78,7 +97,11 @@ COLUMNS = {
     "simplify": {"over the bound %": _share_above("distance", 1),
                  "median % of the bound": lambda made: _median([100 * row["distance"] for row in made], "%.0f"),
                  "median % of the model's triangles": lambda made: _median(
-                     [100 * row["triangles"] / row["model_triangles"] for row in made], "%.1f")}}
+                     [100 * row["triangles"] / row["model_triangles"] for row in made], "%.1f")},
+    "combine": {f"wrong volume > {LOSS:.0%}": _share_above("wrong", LOSS),
+                "median % of wrong volume": lambda made: _median([100 * row["wrong"] for row in made], "%.3f"),
+                f"volumes differ > {LOSS:.0%}": lambda made: rate(
+                    sum(error > LOSS for error in volume_errors(made)), len(volume_errors(made)))}}
 
 
 def table(rows, methods, task="remesh"):
@@ -154,6 +177,8 @@ def trouble(row):
     if not row["watertight"]:
         defects = ", ".join(f"{count} {name.replace('_', ' ')}" for name, count in row["defects"].items())
         reasons.append((1.2, f"not valid: {defects}"))
+    if row.get("wrong", 0) > LOSS:
+        reasons.append((row["wrong"], f"{row['wrong']:.1%} of the volume wrong"))
     if row.get("distance", 0) > 1:
         reasons.append((1.1, f"{row['distance']:.2f} times the bound"))
     reasons += [(share, f"{row[key]:.1%} {text}") for key, text in (

@@ -1,9 +1,10 @@
-"""Blender's modifier Remesh: blender.py voxel|sharp [ADAPTIVITY] REQUEST
+"""Blender's modifiers Remesh and Boolean: blender.py voxel|sharp|boolean [ADAPTIVITY] REQUEST
 
 Modes Voxel and Sharp with their defaults (User Manual, Modeling, Modifiers, Remesh), except that Remove
 Disconnected is off in mode Sharp: by default it removes all bodies but the largest. Octree depth and scale
 give cells of the requested size. The manual promises "a new manifold mesh" in mode Voxel, and nothing in mode
-Sharp.
+Sharp. The modifier Boolean has the solver Exact, its default, and the defaults otherwise; the manual promises
+no topology.
 """
 import sys
 
@@ -14,8 +15,10 @@ def work(request):
     mode, adaptivity = sys.argv[1], sys.argv[2] if len(sys.argv) > 3 else "0"
     blender = adapter.program("blender", "install the package blender")
     command = [blender, "--background", "--factory-startup", "--threads", request.get("threads") or 0,
-               "--python-exit-code", "1", "--python", adapter.PEERS / "blender_peer.py", "--", "IN.obj",
-               "OUT.obj", adapter.length(request), "sharp" if mode == "sharp" else adaptivity]
+               "--python-exit-code", "1", "--python", adapter.PEERS / "blender_peer.py", "--", "IN.obj", "OUT.obj"]
+    if mode == "boolean":
+        return adapter.with_files(request, [*command, request["operation"], "SECOND.obj"])
+    command += [adapter.length(request), "sharp" if mode == "sharp" else adaptivity]
     return adapter.with_files(request, command, **({"manifold": True} if mode == "voxel" else {}))
 
 
