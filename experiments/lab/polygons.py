@@ -141,16 +141,24 @@ def volume(corners):
     return float(numpy.einsum("ij,ij", a, numpy.cross(b, c)) / 6)
 
 
-def place(first, second, seed):
-    """Returns two solids whose surfaces meet, in single precision and with positive volumes.
+def _inner_point(corners, seed):
+    """Returns a random point between a random point of the surface and the next one in the direction inwards."""
+    point, chosen = samples(corners, 1, seed)
+    inwards = -normals(corners)[0][chosen[0]]
+    depth = first_hit(corners, point[0], inwards, 1e-6 * numpy.ptp(corners.reshape(-1, 3)))
+    return point[0] + (numpy.random.default_rng(seed).random() * depth if depth < numpy.inf else 0) * inwards
 
-    The second one is scaled to the diagonal of the first and rotated, and a random point of its surface is moved
-    to a random point of the surface of the first.
+
+def place(first, second, seed):
+    """Returns two solids that overlap, in single precision and with positive volumes.
+
+    The second one is scaled to the diagonal of the first and rotated, and a random point within it is moved to
+    a random point within the first.
     """
     first, second = (s if volume(s) > 0 else s[:, ::-1] for s in (first, second))
     diagonals = [numpy.linalg.norm(numpy.ptp(s.reshape(-1, 3), axis=0)) for s in (first, second)]
     second = diagonals[0] / diagonals[1] * second @ Rotation.random(random_state=seed).as_matrix().T
-    second = second + samples(first, 1, seed)[0] - samples(second, 1, seed + 1)[0]
+    second = second + _inner_point(first, seed) - _inner_point(second, seed + 1)
     return [s.astype(numpy.float32).astype(float) for s in (first, second)]
 
 
@@ -170,13 +178,13 @@ def _crossings(corners, lines):
 
 
 def wrong_share(first, second, output, operation, count=1000):
-    """Returns the volume in which a mesh differs from the result of an operation, as a share of the union's.
+    """Returns the volume in which a mesh differs from the result of an operation, as a share of the result.
 
     Both volumes are integrated along random vertical lines.
     """
     corners = numpy.concatenate([first, second, output]).reshape(-1, 3)[:, :2]
     lines = numpy.random.default_rng(0).uniform(corners.min(axis=0), corners.max(axis=0), (count, 2))
-    wrong = total = 0.0
+    wrong = total = 0.0  # volumes per area
     for found in zip(*(_crossings(solid, lines) for solid in (first, second, output))):
         height = numpy.concatenate([z for z, _ in found])
         change = numpy.concatenate([numpy.outer(sign, unit) for (_, sign), unit in zip(found, numpy.eye(3))])
@@ -184,8 +192,8 @@ def wrong_share(first, second, output, operation, count=1000):
         a, b, made = (numpy.cumsum(change[order], axis=0)[:-1] > 0).T
         right = {"union": a | b, "intersection": a & b, "difference": a & ~b}[operation]
         length = numpy.diff(height[order])
-        wrong, total = wrong + length[made != right].sum(), total + length[a | b].sum()
-    return float(wrong / total) if total else 1.0
+        wrong, total = wrong + length[made != right].sum(), total + length[right].sum()
+    return float(wrong / total) if total else float(wrong > 0)
 
 
 def normals(corners):

@@ -8,6 +8,7 @@ import os
 import sys
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
+import bmesh
 import bpy
 import peer
 
@@ -54,4 +55,10 @@ def work():
 
 
 made = peer.measured(work)
+if is_boolean:  # triangles of the display intersect in polygons with many corners; this is Triangulate's default
+    shape = bmesh.new()
+    shape.from_mesh(made)
+    bmesh.ops.triangulate(shape, faces=shape.faces[:], quad_method="BEAUTY", ngon_method="BEAUTY")
+    shape.to_mesh(made)
+    made.calc_loop_triangles()
 peer.write_obj(target, [v.co / scale for v in made.vertices], [tuple(t.vertices) for t in made.loop_triangles])

@@ -265,12 +265,11 @@ class Solids(unittest.TestCase):
     def test_wrong_volume(self):
         self.assertAlmostEqual(abs(polygons.volume(self.shifted)), 8)
         common = 1.9 * 2 * 2
-        union = 16 - common
-        for operation, output, expected in (
-                ("union", self.cube, 8 - common), ("intersection", self.cube, 8 - common),
-                ("difference", self.cube, common)):
-            found = polygons.wrong_share(self.cube, self.shifted, output, operation)
-            self.assertAlmostEqual(found, expected / union, delta=0.03)
+        for operation, expected in (("union", (8 - common) / (16 - common)),
+                                    ("intersection", (8 - common) / common),
+                                    ("difference", common / (8 - common))):
+            found = polygons.wrong_share(self.cube, self.shifted, self.cube, operation)
+            self.assertAlmostEqual(found / expected, 1, delta=0.3)
         self.assertEqual(polygons.wrong_share(self.cube, self.cube, self.cube, "union"), 0)
         self.assertEqual(polygons.wrong_share(self.cube, self.cube, self.cube, "difference"), 1)
 
@@ -279,7 +278,7 @@ class Solids(unittest.TestCase):
         for seed in range(4):
             first, second = polygons.place(self.cube, 100 * inverted, seed)
             self.assertGreater(min(map(polygons.volume, (first, second))), 7.9)
-            self.assertGreater(polygons.wrong_share(first, second, first, "difference"), 1e-4)  # they overlap
+            self.assertGreater(polygons.wrong_share(first, second, first, "difference"), 1e-3)  # they overlap
 
     def test_pairs(self):
         entries = [corpus.Entry("p", "1", f"f{i}", f"{i:064}", "off" if i % 2 else "gltf", 1, "none")

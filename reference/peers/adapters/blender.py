@@ -3,8 +3,8 @@
 Modes Voxel and Sharp with their defaults (User Manual, Modeling, Modifiers, Remesh), except that Remove
 Disconnected is off in mode Sharp: by default it removes all bodies but the largest. Octree depth and scale
 give cells of the requested size. The manual promises "a new manifold mesh" in mode Voxel, and nothing in mode
-Sharp. The modifier Boolean has the solver Exact, its default, and the defaults otherwise; the manual promises
-no topology.
+Sharp. The modifier Boolean has the solver Exact and its other defaults. Its polygons have many corners, and are
+split with the default of the modifier Triangulate for them, Beauty. The manual promises no topology.
 """
 import sys
 
