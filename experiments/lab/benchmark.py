@@ -313,7 +313,8 @@ class Benchmark:
         output = request["output"]
         reason = []
         reference = [] if self.task == "combine" else [
-            "--reference", str(path), "--voxel-size", repr(voxel), "--samples", "20000", "--solid-samples", "0"]
+            "--reference", str(path), "--voxel-size", repr(voxel), "--samples", "20000",
+            "--solid-samples", "0"]
         report = self._ask("validate", output, *reference, reason=reason)
         if not report or not report.get("visible_loss" if reference else "area"):
             what = f"the validation ended with: {reason[0]}" if reason and reason[0].endswith("limit") \

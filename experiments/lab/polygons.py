@@ -142,7 +142,7 @@ def volume(corners):
 
 
 def _inner_point(corners, seed):
-    """Returns a random point between a random point of the surface and the next one in the direction inwards."""
+    """Returns a random point between a random point of the surface and the next one inwards."""
     point, chosen = samples(corners, 1, seed)
     inwards = -normals(corners)[0][chosen[0]]
     depth = first_hit(corners, point[0], inwards, 1e-6 * numpy.ptp(corners.reshape(-1, 3)))
@@ -152,8 +152,8 @@ def _inner_point(corners, seed):
 def place(first, second, seed):
     """Returns two solids that overlap, in single precision and with positive volumes.
 
-    The second one is scaled to the diagonal of the first and rotated, and a random point within it is moved to
-    a random point within the first.
+    The second one is scaled to the diagonal of the first and rotated, and a random point within it is moved
+    to a random point within the first.
     """
     first, second = (s if volume(s) > 0 else s[:, ::-1] for s in (first, second))
     diagonals = [numpy.linalg.norm(numpy.ptp(s.reshape(-1, 3), axis=0)) for s in (first, second)]

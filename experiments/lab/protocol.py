@@ -91,8 +91,8 @@ def distance(report, key, limit, ask, model):
 
 
 def share_of_error(report, error, scale, ask, model):
-    """Returns the larger one of both sampled distances divided by the error, at most 1 if the excess is within
-    the allowance for rounding.
+    """Returns the larger one of both sampled distances divided by the error, at most 1 if the excess is
+    within the allowance for rounding.
     """
     limit = error * (1 + SLACK) + ROUNDING * scale
     largest = max(distance(report, key, limit, ask, model) for key in DISTANCES.values())

@@ -73,6 +73,10 @@ def _share_above(key, limit):
     return lambda made: rate(sum(row[key] > limit for row in made), len(made))
 
 
+def _median_percentage(key, form):
+    return lambda made: _median([100 * row[key] for row in made], form)
+
+
 def volume_errors(made):
     """Returns by how much |A| + |B| = |A ∪ B| + |A ∩ B| and |A| = |A ∖ B| + |A ∩ B| fail, as shares of
     |A| + |B|, of each pair for which a method made both meshes.
@@ -95,11 +99,11 @@ COLUMNS = {
                f"vanished > {LOSS:.0%}": _share_above("vanished", LOSS),
                f"invented > {INVENTED:.0%}": _share_above("invented", INVENTED)},
     "simplify": {"over the bound %": _share_above("distance", 1),
-                 "median % of the bound": lambda made: _median([100 * row["distance"] for row in made], "%.0f"),
+                 "median % of the bound": _median_percentage("distance", "%.0f"),
                  "median % of the model's triangles": lambda made: _median(
                      [100 * row["triangles"] / row["model_triangles"] for row in made], "%.1f")},
     "combine": {f"wrong volume > {LOSS:.0%}": _share_above("wrong", LOSS),
-                "median % of wrong volume": lambda made: _median([100 * row["wrong"] for row in made], "%.3f"),
+                "median % of wrong volume": _median_percentage("wrong", "%.3f"),
                 f"volumes differ > {LOSS:.0%}": lambda made: rate(
                     sum(error > LOSS for error in volume_errors(made)), len(volume_errors(made)))}}
 

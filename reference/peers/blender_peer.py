@@ -55,7 +55,8 @@ def work():
 
 
 made = peer.measured(work)
-if is_boolean:  # triangles of the display intersect in polygons with many corners; this is Triangulate's default
+if is_boolean:
+    # The display's triangles of polygons with many corners intersect; this is the default of Triangulate.
     shape = bmesh.new()
     shape.from_mesh(made)
     bmesh.ops.triangulate(shape, faces=shape.faces[:], quad_method="BEAUTY", ngon_method="BEAUTY")

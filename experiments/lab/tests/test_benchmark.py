@@ -139,8 +139,8 @@ class Rates(unittest.TestCase):
 
     def test_volumes_of_pairs_add_up(self):
         def of(operation, volume, method="a"):
-            return row_of(method, operation[0], **{"class": operation}, pair="p", volumes=[8.0, 4.0], wrong=0.0,
-                          volume=volume)
+            return row_of(method, operation[0], **{"class": operation}, pair="p", volumes=[8.0, 4.0],
+                          wrong=0.0, volume=volume)
         rows = [of("union", 11.0), of("intersection", 1.0), of("difference", 7.6), of("union", 11.0, "b")]
         self.assertEqual([round(error, 9) for error in sorted(rates.volume_errors(rows[:3]))], [0, 0.05])
         self.assertEqual(rates.volume_errors(rows[3:]), [])

@@ -159,9 +159,9 @@ def with_arrays(remesh, **claims):
 
 
 def with_files(request, command, refusal=None, **claims):
-    """Runs a peer whose arguments contain IN.obj or IN.ply, OUT.obj, and SECOND.obj if there are two inputs. A
-    peer may print its seconds. A
-    message that contains the text `refusal` means that the program refuses the input.
+    """Runs a peer whose arguments contain IN.obj or IN.ply, OUT.obj, and SECOND.obj if there are two inputs,
+    and which may print its seconds. A message that contains the text `refusal` means that the program refuses
+    the input.
     """
     points, triangles = read_mesh(request["input"])
     with tempfile.TemporaryDirectory() as work:

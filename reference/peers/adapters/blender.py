@@ -3,8 +3,8 @@
 Modes Voxel and Sharp with their defaults (User Manual, Modeling, Modifiers, Remesh), except that Remove
 Disconnected is off in mode Sharp: by default it removes all bodies but the largest. Octree depth and scale
 give cells of the requested size. The manual promises "a new manifold mesh" in mode Voxel, and nothing in mode
-Sharp. The modifier Boolean has the solver Exact and its other defaults. Its polygons have many corners, and are
-split with the default of the modifier Triangulate for them, Beauty. The manual promises no topology.
+Sharp. The modifier Boolean has the solver Exact and its other defaults. Its polygons have many corners, and
+are split with the default of the modifier Triangulate for them, Beauty. The manual promises no topology.
 """
 import sys
 
@@ -15,7 +15,8 @@ def work(request):
     mode, adaptivity = sys.argv[1], sys.argv[2] if len(sys.argv) > 3 else "0"
     blender = adapter.program("blender", "install the package blender")
     command = [blender, "--background", "--factory-startup", "--threads", request.get("threads") or 0,
-               "--python-exit-code", "1", "--python", adapter.PEERS / "blender_peer.py", "--", "IN.obj", "OUT.obj"]
+               "--python-exit-code", "1", "--python", adapter.PEERS / "blender_peer.py", "--", "IN.obj",
+               "OUT.obj"]
     if mode == "boolean":
         return adapter.with_files(request, [*command, request["operation"], "SECOND.obj"])
     command += [adapter.length(request), "sharp" if mode == "sharp" else adaptivity]

@@ -13,8 +13,8 @@ def work(request):
         return adapter.with_files(request, [*command, request["operation"], "SECOND.obj"],
                                   refusal="ManifoldError", watertight=True, manifold=True)
     tolerance = request.get("error") or 0.25 * request["voxel_size"]
-    return adapter.with_files(request, [*command, tolerance], refusal="ManifoldError", watertight=True, manifold=True,
-                              distance_to_input=tolerance, distance_from_input=tolerance)
+    return adapter.with_files(request, [*command, tolerance], refusal="ManifoldError", watertight=True,
+                              manifold=True, distance_to_input=tolerance, distance_from_input=tolerance)
 
 
 adapter.run(work)

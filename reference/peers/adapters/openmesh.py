@@ -1,8 +1,8 @@
 """OpenMesh's decimater within a distance: openmesh.py REQUEST
 
 Quadrics give the order; ModHausdorff "only allows collapses if the Hausdorff distance after a collapse is
-lower than the given tolerance" (ModHausdorffT.hh), which is claimed in both directions. OpenMesh takes manifold
-meshes only, and ModNormalFlipping excludes no self-intersection, so no topology is claimed.
+lower than the given tolerance" (ModHausdorffT.hh), which is claimed in both directions. OpenMesh takes
+manifold meshes only, and ModNormalFlipping excludes no self-intersection, so no topology is claimed.
 """
 import adapter
 
