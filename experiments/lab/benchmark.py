@@ -1,11 +1,14 @@
-"""A benchmark of remeshing programs on a corpus of models: one row per model and program.
+"""A benchmark of programs on a corpus of models: one row per model and program.
 
 An experiment file (TOML) has these keys:
 
 base        another file with some of these keys, which this one replaces; its methods follow (optional)
 question    one sentence
+task        "remesh" (default), "simplify", which requires an error, or "combine"
 corpus      table of files in experiments/data
-models      number of files, "all", or numbers by tier: {quick = 60, full = 500}
+classes     classes of models to take; all if absent
+models      number of files, "all", or numbers by tier: {quick = 60, full = 500}; for "combine", of random
+            pairs, each with three operations
 sample      "random" with the seed (default), or "listed": the first of the column `order` of the corpus
 seed        of the sample, and of the programs
 resolution  voxels along the longest side of a model: the scale at which losses are measured
@@ -17,6 +20,7 @@ memory_mib  limit of address space per run
             adapter  a program that follows the protocol (PROTOCOL.md) and its first arguments; words with a
                      slash are paths in the checkout
             request  a program without an adapter and its arguments, in which {hermesh}, {input}, {output},
+                     {second} and {operation} (of "combine"),
                      {resolution}, {voxel} (or {error}, in the units of the file), {seed} and {threads} are
                      replaced; `claims` has what it claims of each mesh, e.g.
                      {watertight = true, distance_to_input = "{error}"}
@@ -38,6 +42,8 @@ import sys
 import tempfile
 import tomllib
 
+import numpy
+
 from . import child, corpus, polygons, protocol, rates
 from .rows import ROOT, LabError, append_rows, drop_torn_row
 
@@ -49,7 +55,7 @@ VALIDATION = child.Limits(seconds=600, memory_mib=16_384)
 DEFECTS = ("boundary_edges", "non_manifold_edges", "non_manifold_vertices", "inconsistent_edges",
            "inside_out_components", "self_intersecting_pairs")
 REQUIRED = {"question", "corpus", "models", "seed", "resolution", "seconds", "memory_mib", "method"}
-OPTIONAL = {"sample", "error", "threads"}
+OPTIONAL = {"sample", "error", "threads", "task", "classes"}
 
 
 def _read_with_base(path):
@@ -70,6 +76,10 @@ def read_experiment(path):
     allowed = {"name", "request"}, {"name", "request", "claims"}, {"name", "adapter"}
     if any(method.keys() not in allowed for method in experiment["method"]):
         raise LabError(f"{path}: a [[method]] has a name, and an adapter or a request with optional claims")
+    if (task := experiment.get("task", "remesh")) not in protocol.TASKS:
+        raise LabError(f"{path}: unknown task '{task}'; expected {', '.join(protocol.TASKS)}")
+    if task == "simplify" and "error" not in experiment:
+        raise LabError(f"{path}: the task simplify requires an error")
     return experiment
 
 
@@ -108,6 +118,27 @@ def facts(ask, path):
             "triangles": report["triangles"] + 2 * report["quads"] if report else 0}
 
 
+def write_pair(pair, cache, files):
+    """Writes the two solids of a pair as OBJ files."""
+    solids = polygons.place(*(polygons.read(corpus.location(e, cache))[0] for e in (pair.first, pair.second)),
+                            int(pair.key[:8], 16))
+    for file, solid in zip(files, solids):
+        polygons.write_obj(file, solid)
+
+
+def pair_facts(ask, pair, files):
+    """Returns what is computed of the solids of a pair."""
+    found = [facts(ask, file) for file in files]
+    lower, upper = (side([f["box"][i] for f in found], axis=0).tolist()
+                    for i, side in enumerate((numpy.min, numpy.max)))
+    tags = {tag for f in found for tag in f["tags"].split(", ") if tag}
+    tags |= {"input not clean"} if any(f["class"] != "clean solid" for f in found) else set()
+    return {"class": pair.operation, "tags": ", ".join(sorted(tags)), "box": [lower, upper],
+            "diagonal": math.dist(lower, upper), "triangles": sum(f["triangles"] for f in found),
+            **{key: max(f[key] for f in found) for key in ("size", "largest_coordinate")},
+            "pair": pair.key, "volumes": [polygons.volume(polygons.read(file)[0]) for file in files]}
+
+
 def _pool(jobs):
     """Returns worker processes with separate cores, since a program may use the first of those allowed."""
     cores, shares = sorted(os.sched_getaffinity(0)), multiprocessing.SimpleQueue()
@@ -125,6 +156,7 @@ class Benchmark:
     def __init__(self, experiment, hermesh, out, say, shard=""):
         self.experiment, self.hermesh, self.out = experiment, hermesh, pathlib.Path(out)
         self.shard, self._say = shard, say
+        self.task = experiment.get("task", "remesh")
         self.out.mkdir(parents=True, exist_ok=True)
         self.limits = child.Limits(experiment["seconds"], experiment["memory_mib"])
 
@@ -165,7 +197,8 @@ class Benchmark:
         """Returns the rows of all shards with the class, tags and size of their models."""
         models = {row["sha256"]: row for row in self._read("models")}
         rows = {(row["sha256"], row["method"]): row for row in self._read("rows")}
-        return [{**row, **{key: models[sha][key] for key in ("class", "tags", "name")},
+        known = ("class", "tags", "name", "pair", "volumes")
+        return [{**row, **{key: models[sha][key] for key in known if key in models[sha]},
                  "model_triangles": models[sha]["triangles"]}
                 for (sha, _), row in rows.items() if sha in models]
 
@@ -194,13 +227,22 @@ class Benchmark:
             return None
 
     def _run_model(self, task, cache, is_first=False):
-        """Runs methods on a model and appends their rows."""
+        """Runs methods on a model or a pair, and appends their rows."""
         entry, methods = task
-        path = corpus.location(entry, cache)
+        if not isinstance(entry, corpus.Pair):
+            path = corpus.location(entry, cache)
+            return self._run_methods(entry, methods, is_first, path, lambda: facts(self._ask, path))
+        with tempfile.TemporaryDirectory() as folder:
+            files = [pathlib.Path(folder) / "first.obj", pathlib.Path(folder) / "second.obj"]
+            write_pair(entry, cache, files)
+            return self._run_methods(entry, methods, is_first, files[0],
+                                     lambda: pair_facts(self._ask, entry, files))
+
+    def _run_methods(self, entry, methods, is_first, path, compute_facts):
         model = next((row for row in self._read("models") if row["sha256"] == entry.sha256), None)
         if model is None:
             model = {"sha256": entry.sha256, "package": entry.package, "path": entry.path, "name": entry.name,
-                     **facts(self._ask, path)}
+                     **compute_facts()}
             append_rows(self._file("models"), [model])
         rows = []
         for method in methods:
@@ -228,9 +270,12 @@ class Benchmark:
         goal = {"voxel_size": voxel, "resolution": experiment["resolution"]}
         if "error" in experiment:
             goal = {"error": experiment["error"] * model["diagonal"], "resolution": None}
+        if self.task == "combine":
+            goal |= {"second": str(path.with_name("second.obj")), "operation": model["class"]}
         file, request, environment = protocol.write_request(
-            work, input=str(path), **goal, seed=experiment["seed"], threads=experiment.get("threads", 1),
-            seconds=experiment["seconds"], memory_mib=experiment["memory_mib"])
+            work, task=self.task, input=str(path), **goal, seed=experiment["seed"],
+            threads=experiment.get("threads", 1), seconds=experiment["seconds"],
+            memory_mib=experiment["memory_mib"])
         words = {"hermesh": self.hermesh, "voxel": voxel, **request, "resolution": experiment["resolution"]}
         command = [word.format(**words) for word in method.get("request") or method["adapter"]]
         if "adapter" in method:
@@ -263,13 +308,16 @@ class Benchmark:
         else:
             claims = {name: float(value.format(**words)) if isinstance(value, str) else value
                       for name, value in claims.items()}
-        return self._validate(row, model, path, request["output"], voxel, claims, seconds, ended)
+        return self._validate(row, model, path, request, voxel, claims, seconds, ended)
 
-    def _validate(self, row, model, path, output, voxel, claims, seconds, ended):
+    def _validate(self, row, model, path, request, voxel, claims, seconds, ended):
+        output = request["output"]
         reason = []
-        report = self._ask("validate", output, "--reference", str(path), "--voxel-size", repr(voxel),
-                           "--samples", "20000", "--solid-samples", "0", reason=reason)
-        if not report or not report.get("visible_loss"):
+        reference = [] if self.task == "combine" else [
+            "--reference", str(path), "--voxel-size", repr(voxel), "--samples", "20000",
+            "--solid-samples", "0"]
+        report = self._ask("validate", output, *reference, reason=reason)
+        if not report or not report.get("visible_loss" if reference else "area"):
             what = f"the validation ended with: {reason[0]}" if reason and reason[0].endswith("limit") \
                 else "the output is missing or not a mesh"
             return {**row, "status": "wrong output", "message": what}, None
@@ -281,12 +329,18 @@ class Benchmark:
                 raise LabError(f"the output cannot be validated with the reference {reference} {options}")
             return found
 
-        visible, defects = report["visible_loss"], {key: report[key] for key in DEFECTS if report[key]}
+        defects = {key: report[key] for key in DEFECTS if report[key]}
         row.update(triangles=report["triangles"] + 2 * report["quads"], components=report["components"],
-                   watertight=not defects, defects=defects, claims=claims, failed_claims=[],
-                   # Without visible surface, the shares are undefined and nothing is lost.
-                   **{share: visible[f"{share}_share"]["value"] or 0.0
-                      for share in ("lost", "vanished", "filled", "invented")})
+                   watertight=not defects, defects=defects, claims=claims, failed_claims=[])
+        if self.task == "simplify":
+            row["distance"] = protocol.share_of_error(report, request["error"], model["largest_coordinate"],
+                                                      ask, path)
+        elif self.task == "combine":
+            solids = (polygons.read(file)[0] for file in (path, request["second"], output))
+            row |= {"wrong": polygons.wrong_share(*solids, request["operation"]), "volume": report["volume"]}
+        else:  # without visible surface, the shares are undefined and nothing is lost
+            row |= {share: report["visible_loss"][f"{share}_share"]["value"] or 0.0
+                    for share in ("lost", "vanished", "filled", "invented")}
         if seconds is not None:
             row["seconds"] = seconds
         mib = (os.path.getsize(path) + os.path.getsize(output)) / child.MIB
@@ -405,20 +459,25 @@ def run(arguments):
         experiment["method"] = [m for m in experiment["method"] if m["name"] in arguments.method]
     models = experiment["models"]
     models = arguments.models or (models[arguments.tier] if isinstance(models, dict) else models)
-    entries = corpus.read_corpus(ROOT / "experiments/data" / experiment["corpus"])
-    choose = corpus.listed if (arguments.sample or experiment.get("sample")) == "listed" else corpus.sample
+    classes = experiment.get("classes", rates.CLASSES)
+    entries = [e for e in corpus.read_corpus(ROOT / "experiments/data" / experiment["corpus"])
+               if not e.kind or e.kind in classes]
+    kind = arguments.sample or experiment.get("sample")
+    choose = corpus.pairs if experiment.get("task") == "combine" else \
+        corpus.listed if kind == "listed" else corpus.sample
     entries, shard = choose(entries, models, experiment["seed"]), ""
     if arguments.shard:
         number, count = _parse_shard(arguments.shard)
         entries, shard = entries[number - 1::count], f"-{number}-of-{count}"
-    corpus.fetch(entries, cache, say)
+    pairs = [e for e in entries if isinstance(e, corpus.Pair)]
+    corpus.fetch([e for p in pairs for e in (p.first, p.second)] if pairs else entries, cache, say)
     out = arguments.out or ROOT / "results/local" / file.stem
     hermesh = os.path.abspath(arguments.hermesh)
     benchmark = Benchmark(experiment, hermesh, out, say, shard)
     rows = benchmark.run(entries, cache, arguments.jobs)
     ours = {m["name"] for m in experiment["method"] if m["name"].startswith("hermesh")}
     rates.write_report(rows, [m["name"] for m in experiment["method"]], ours, experiment["question"], out,
-                       _provenance(hermesh))
+                       benchmark.task, _provenance(hermesh))
     print((out / "table.md").read_text())
     say(f"Table, profiles and worst cases: {out}/table.md, profiles.svg, gallery.html")
     return 0

@@ -26,6 +26,7 @@ import zipfile
 from .rows import LabError
 
 
+OPERATIONS = ("union", "intersection", "difference")
 SIZES = {1_000: "below 1,000 triangles", 10_000: "below 10,000", 100_000: "below 100,000", math.inf: "larger"}
 
 
@@ -46,6 +47,17 @@ class Entry:
     @property
     def name(self):
         return posixpath.basename(self.path.split("!")[-1])
+
+
+class Pair:
+    """Two entries and a Boolean operation: what a row of the task combine is about."""
+
+    def __init__(self, first, second, operation, seed):
+        self.first, self.second, self.operation = first, second, operation
+        self.key = hashlib.sha256(f"{seed} {first.sha256} {second.sha256}".encode()).hexdigest()
+        self.sha256 = hashlib.sha256(f"{self.key} {operation}".encode()).hexdigest()
+        self.package, self.path = f"{first.package}, {second.package}", f"{first.path}, {second.path}"
+        self.name = f"{operation} of {first.name} and {second.name}"
 
 
 def read_corpus(path):
@@ -110,6 +122,19 @@ def sample(entries, count, seed):
         return entries
     chosen = set(random.Random(seed).sample(sorted(e.sha256 for e in entries), count))
     return [e for e in entries if e.sha256 in chosen]
+
+
+def pairs(entries, count, seed):
+    """Returns random pairs of entries of the formats that polygons.py reads, each with all operations."""
+    known = sorted((e for e in entries if e.format.removesuffix(".gz") in ("obj", "off", "ply", "stl")),
+                   key=lambda e: e.sha256)
+    if len(known) < 2 or count == "all":
+        raise LabError("the task combine requires a number of pairs, and two models in OBJ, OFF, PLY or STL")
+    draw, chosen = random.Random(seed), {}
+    while len(chosen) < min(count, len(known) * (len(known) - 1)):
+        first, second = draw.sample(known, 2)
+        chosen[first.sha256, second.sha256] = first, second
+    return [Pair(*pair, operation, seed) for pair in chosen.values() for operation in OPERATIONS]
 
 
 def cache_root():

@@ -1,4 +1,4 @@
-"""Polygons of mesh files (OBJ, OFF, PLY and STL, also gzipped): samples, rays and pictures of them."""
+"""Polygons of mesh files (OBJ, OFF, PLY and STL, also gzipped): samples, rays, pictures and solids."""
 
 import gzip
 import io
@@ -6,6 +6,7 @@ import re
 
 import numpy
 from scipy.spatial import cKDTree
+from scipy.spatial.transform import Rotation
 
 UNIT_TRIANGLE = numpy.array([[1.0, 0, 0], [0, 1, 0], [0, 0, 1]])
 _TYPES = {"char": "i1", "uchar": "u1", "short": "i2", "ushort": "u2", "int": "i4", "uint": "u4",
@@ -124,6 +125,75 @@ def _ply(data):
             elif name == "face":
                 polygons.append([int(v) for v in row.get("vertex_indices", row.get("vertex_index"))])
     return points, *_fans(polygons)
+
+
+def write_obj(path, corners):
+    """Writes triangles, in which corners with the same coordinates are one vertex."""
+    points, vertices = numpy.unique(corners.reshape(-1, 3), axis=0, return_inverse=True)
+    with open(path, "w") as file:
+        file.writelines("v %.17g %.17g %.17g\n" % tuple(point) for point in points)
+        file.writelines("f %d %d %d\n" % tuple(triangle) for triangle in vertices.reshape(-1, 3) + 1)
+
+
+def volume(corners):
+    """Returns the volume within closed triangles."""
+    a, b, c = (corners[:, i] - corners[:1, 0] for i in range(3))
+    return float(numpy.einsum("ij,ij", a, numpy.cross(b, c)) / 6)
+
+
+def _inner_point(corners, seed):
+    """Returns a random point between a random point of the surface and the next one inwards."""
+    point, chosen = samples(corners, 1, seed)
+    inwards = -normals(corners)[0][chosen[0]]
+    depth = first_hit(corners, point[0], inwards, 1e-6 * numpy.ptp(corners.reshape(-1, 3)))
+    return point[0] + (numpy.random.default_rng(seed).random() * depth if depth < numpy.inf else 0) * inwards
+
+
+def place(first, second, seed):
+    """Returns two solids that overlap, in single precision and with positive volumes.
+
+    The second one is scaled to the diagonal of the first and rotated, and a random point within it is moved
+    to a random point within the first.
+    """
+    first, second = (s if volume(s) > 0 else s[:, ::-1] for s in (first, second))
+    diagonals = [numpy.linalg.norm(numpy.ptp(s.reshape(-1, 3), axis=0)) for s in (first, second)]
+    second = diagonals[0] / diagonals[1] * second @ Rotation.random(random_state=seed).as_matrix().T
+    second = second + _inner_point(first, seed) - _inner_point(second, seed + 1)
+    return [s.astype(numpy.float32).astype(float) for s in (first, second)]
+
+
+def _crossings(corners, lines):
+    """Yields the heights at which each vertical line (x, y) crosses closed triangles, and the changes of the
+    winding number there on the way up.
+    """
+    low, high = corners[:, :, :2].min(axis=1), corners[:, :, :2].max(axis=1)
+    for line in lines:
+        near = corners[((low <= line) & (line <= high)).all(axis=1)]
+        d = near[:, :, :2] - line
+        weights = numpy.stack([d[:, i - 2, 0] * d[:, i - 1, 1] - d[:, i - 2, 1] * d[:, i - 1, 0]
+                               for i in range(3)], axis=1)
+        is_hit = (weights > 0).all(axis=1) | (weights < 0).all(axis=1)
+        weights, total = weights[is_hit], weights[is_hit].sum(axis=1)
+        yield (weights * near[is_hit, :, 2]).sum(axis=1) / total, -numpy.sign(total).astype(int)
+
+
+def wrong_share(first, second, output, operation, count=1000):
+    """Returns the volume in which a mesh differs from the result of an operation, as a share of the result.
+
+    Both volumes are integrated along random vertical lines.
+    """
+    corners = numpy.concatenate([first, second, output]).reshape(-1, 3)[:, :2]
+    lines = numpy.random.default_rng(0).uniform(corners.min(axis=0), corners.max(axis=0), (count, 2))
+    wrong = total = 0.0  # volumes per area
+    for found in zip(*(_crossings(solid, lines) for solid in (first, second, output))):
+        height = numpy.concatenate([z for z, _ in found])
+        change = numpy.concatenate([numpy.outer(sign, unit) for (_, sign), unit in zip(found, numpy.eye(3))])
+        order = numpy.argsort(height)
+        a, b, made = (numpy.cumsum(change[order], axis=0)[:-1] > 0).T
+        right = {"union": a | b, "intersection": a & b, "difference": a & ~b}[operation]
+        length = numpy.diff(height[order])
+        wrong, total = wrong + length[made != right].sum(), total + length[right].sum()
+    return float(wrong / total) if total else float(wrong > 0)
 
 
 def normals(corners):

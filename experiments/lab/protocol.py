@@ -6,6 +6,7 @@ import os
 
 from . import polygons
 
+TASKS = ("remesh", "simplify", "combine")
 NOT_INSTALLED = 77  # exit code of an adapter whose program is not installed
 # Counts of `hermesh validate` that must be 0.
 CLAIMS = {"watertight": ("boundary_edges", "inconsistent_edges"),
@@ -20,7 +21,7 @@ START_SECONDS, SECONDS_PER_MIB, CLOCK_SECONDS = 5.0, 1.0, 0.01
 
 def write_request(directory, **values):
     """Writes request.json; returns its path and the environment with the same values as HERMESH_NAME."""
-    request = {"version": 1, "task": "remesh", **values, "output": f"{directory}/out.ply",
+    request = {"version": 1, **values, "output": f"{directory}/out.ply",
                "result": f"{directory}/result.json"}
     path = f"{directory}/request.json"
     with open(path, "w") as file:
@@ -74,12 +75,28 @@ def failed_claims(claims, seconds, ended, mib, report, scale, ask, model, output
     failed = [name for name, counts in CLAIMS.items() if claims.get(name) and any(map(report.get, counts))]
     for name, key in DISTANCES.items():
         limit = claims.get(name, math.inf) * (1 + SLACK) + ROUNDING * scale
-        # A polygon that is not flat has several triangulations; the claim may hold for either.
-        if report[key]["max"] > limit \
-                and ask(str(model), "--reference-quads", "as-given")[key]["max"] > limit \
+        if key in report and distance(report, key, limit, ask, model) > limit \
                 and (key == "to_reference" or visible_distance(ask, model, output, scale) > limit):
             failed.append(name)
     return failed + (["seconds"] if seconds is not None and is_false_time(seconds, ended, mib) else [])
+
+
+def distance(report, key, limit, ask, model):
+    """Returns the largest sampled distance in one direction. A polygon that is not flat has several
+    triangulations; if the distance exceeds the limit, it is the smaller one of both.
+    """
+    largest = report[key]["max"]
+    return largest if largest <= limit else \
+        min(largest, ask(str(model), "--reference-quads", "as-given")[key]["max"])
+
+
+def share_of_error(report, error, scale, ask, model):
+    """Returns the larger one of both sampled distances divided by the error, at most 1 if the excess is
+    within the allowance for rounding.
+    """
+    limit = error * (1 + SLACK) + ROUNDING * scale
+    largest = max(distance(report, key, limit, ask, model) for key in DISTANCES.values())
+    return largest / error if largest > limit else min(1.0, largest / error)
 
 
 def is_false_time(seconds, ended, mib):

@@ -12,13 +12,15 @@ import numpy
 from scipy.stats import binomtest
 
 from . import plots
-from .corpus import SIZES, size_group
+from .corpus import OPERATIONS, SIZES, size_group
 from .rows import LabError
 
 CLASSES = ["clean solid", "closed, self-intersecting", "closed, non-manifold or doubled", "few holes",
            "open sheets", "flat", "no mesh"]
-TAGS = ["several bodies", "thinner than a voxel"]
+TAGS = ["several bodies", "thinner than a voxel", "input not clean"]
 LOSS = INVENTED = 0.01  # shares of the visible surface, and of the output, above which they count
+NEAR = {"remesh": "valid and near %", "simplify": "valid and within the bound %",
+        "combine": "valid and right %"}
 WORST = 300  # cases in the gallery
 VARYING = {"cpu_seconds", "wall_seconds", "seconds", "peak_mib"}  # from day to day
 
@@ -31,6 +33,15 @@ def rate(count, of):
     return f"{100 * count / of:.1f} [{100 * interval.low:.1f}, {100 * interval.high:.1f}]"
 
 
+def is_near(row):
+    """Returns True if a mesh is near the model, within the bound of a simplification, or the right solid."""
+    if "distance" in row:
+        return row["distance"] <= 1
+    if "wrong" in row:
+        return row["wrong"] <= LOSS
+    return row["lost"] <= LOSS and row["invented"] <= INVENTED
+
+
 def counted(rows):
     """Returns the rows with their successes, except those of programs that are not installed."""
     result = []
@@ -38,7 +49,7 @@ def counted(rows):
         done = row["status"] == "done"
         valid = done and row["watertight"]
         result.append({**row, "done": done, "valid": valid,
-                       "near": valid and row["lost"] <= LOSS and row["invented"] <= INVENTED,
+                       "near": valid and is_near(row),
                        "claims something": done and bool(row.get("claims") or "seconds" in row),
                        "fails a claim": bool(row.get("failed_claims"))})
     return [row for row in result if row["status"] != "not installed"]
@@ -47,7 +58,7 @@ def counted(rows):
 def _groups(rows):
     """Yields the name and the rows of each class, tag and size that has some, and of all meshes."""
     meshes = [row for row in rows if row["class"] != "no mesh"]
-    groups = {name: [row for row in rows if row["class"] == name] for name in CLASSES}
+    groups = {name: [row for row in rows if row["class"] == name] for name in [*CLASSES, *OPERATIONS]}
     groups |= {name: [row for row in meshes if name in row["tags"].split(", ")] for name in TAGS}
     groups |= {name: [row for row in meshes if size_group(row["model_triangles"]) == name]
                for name in SIZES.values()}
@@ -58,11 +69,49 @@ def _median(values, form):
     return form % statistics.median(values) if values else "–"
 
 
-def table(rows, methods):
+def _share_above(key, limit):
+    return lambda made: rate(sum(row[key] > limit for row in made), len(made))
+
+
+def _median_percentage(key, form):
+    return lambda made: _median([100 * row[key] for row in made], form)
+
+
+def volume_errors(made):
+    """Returns by how much |A| + |B| = |A ∪ B| + |A ∩ B| and |A| = |A ∖ B| + |A ∩ B| fail, as shares of
+    |A| + |B|, of each pair for which a method made both meshes.
+    """
+    found, errors = collections.defaultdict(dict), []
+    for row in made:
+        found[row["pair"]][row["class"]] = row
+    for rows in found.values():
+        for operation in {"union", "difference"} & rows.keys() if "intersection" in rows else ():
+            first, second = rows[operation]["volumes"]
+            expected = first + second if operation == "union" else first
+            error = rows[operation]["volume"] + rows["intersection"]["volume"] - expected
+            errors.append(abs(error) / (first + second))
+    return errors
+
+
+# Columns of a task: values of the meshes of a method.
+COLUMNS = {
+    "remesh": {f"loss > {LOSS:.0%}": _share_above("lost", LOSS),
+               f"vanished > {LOSS:.0%}": _share_above("vanished", LOSS),
+               f"invented > {INVENTED:.0%}": _share_above("invented", INVENTED)},
+    "simplify": {"over the bound %": _share_above("distance", 1),
+                 "median % of the bound": _median_percentage("distance", "%.0f"),
+                 "median % of the model's triangles": lambda made: _median(
+                     [100 * row["triangles"] / row["model_triangles"] for row in made], "%.1f")},
+    "combine": {f"wrong volume > {LOSS:.0%}": _share_above("wrong", LOSS),
+                "median % of wrong volume": _median_percentage("wrong", "%.3f"),
+                f"volumes differ > {LOSS:.0%}": lambda made: rate(
+                    sum(error > LOSS for error in volume_errors(made)), len(volume_errors(made)))}}
+
+
+def table(rows, methods, task="remesh"):
     """Returns the success rates as a table in Markdown. Claims and losses are those of the meshes."""
-    head = ["method", "class", "models", "done %", "valid %", "valid and near %", "failed claims %",
-            f"loss > {LOSS:.0%}", f"vanished > {LOSS:.0%}", f"invented > {INVENTED:.0%}", "median CPU s",
-            "of the first method's", "median MiB", "median triangles"]
+    head = ["method", "class", "models", "done %", "valid %", NEAR[task], "failed claims %", *COLUMNS[task],
+            "median CPU s", "of the first method's", "median MiB", "median triangles"]
     lines = ["| " + " | ".join(head) + " |", "| --- | --- |" + " --: |" * (len(head) - 2)]
     rows = counted(rows)
     first = {row["sha256"]: row["cpu_seconds"] for row in rows if row["method"] == methods[0] and row["done"]}
@@ -75,8 +124,7 @@ def table(rows, methods):
                 method, name, str(len(own)),
                 *(rate(sum(row[key] for row in own), len(own)) for key in ("done", "valid", "near")),
                 rate(sum(row["fails a claim"] for row in claiming), len(claiming)),
-                *(rate(sum(row[key] > limit for row in made), len(made))
-                  for key, limit in (("lost", LOSS), ("vanished", LOSS), ("invented", INVENTED))),
+                *(column(made) for column in COLUMNS[task].values()),
                 _median([row["cpu_seconds"] for row in made], "%.2f"),
                 _median([row["cpu_seconds"] / first[row["sha256"]] for row in paired], "%.2f"),
                 _median([row["peak_mib"] for row in made], "%.0f"),
@@ -127,15 +175,19 @@ def trouble(row):
     """Returns how bad a row is and why, None if the output is valid and near and all claims hold."""
     if row["status"] != "done":
         return 2.0, row["status"] + (f": {row['message']}" if row.get("message") else "")
-    reasons, share = [], max(row["lost"], row["invented"])
+    reasons, share = [], max(row.get("lost", 0), row.get("invented", 0))
     if row.get("failed_claims"):
         reasons.append((1.5, "failed claims: " + ", ".join(row["failed_claims"])))
     if not row["watertight"]:
         defects = ", ".join(f"{count} {name.replace('_', ' ')}" for name, count in row["defects"].items())
         reasons.append((1.2, f"not valid: {defects}"))
+    if row.get("wrong", 0) > LOSS:
+        reasons.append((row["wrong"], f"{row['wrong']:.1%} of the volume wrong"))
+    if row.get("distance", 0) > 1:
+        reasons.append((1.1, f"{row['distance']:.2f} times the bound"))
     reasons += [(share, f"{row[key]:.1%} {text}") for key, text in (
         ("vanished", "of the visible surface vanished"), ("filled", "of the visible surface filled"),
-        ("invented", "of the output invented")) if row[key] > LOSS]
+        ("invented", "of the output invented")) if row.get(key, 0) > LOSS]
     if share > LOSS and not any(row[key] > LOSS for key in ("vanished", "filled", "invented")):
         reasons.append((share, f"{row['lost']:.1%} of the visible surface lost"))
     return (max(reasons)[0], "; ".join(text for _, text in reasons)) if reasons else None
@@ -164,12 +216,12 @@ def gallery(rows, ours, question, pictures):
         methods=sorted({case["method"] for case in cases}))
 
 
-def write_report(rows, methods, ours, question, out, provenance=""):
+def write_report(rows, methods, ours, question, out, task="remesh", provenance=""):
     """Writes table.md, profiles.svg and gallery.html."""
     if not rows:
         raise LabError(f"{out}: no method has a row; none of the programs is installed")
     out = pathlib.Path(out)
-    text = [question, "", table(rows, methods)]
+    text = [question, "", table(rows, methods, task)]
     if provenance:
         text += ["", f"Report of {provenance}."]
     if missing := [name for name in methods if not any(row["method"] == name for row in rows)]:

@@ -1,10 +1,12 @@
 // CGAL: edge collapse with Garland and Heckbert's quadrics or Lindstrom and Turk's costs, the latter within a
-// polyhedral envelope, too, and alpha wrapping.
+// polyhedral envelope, too, alpha wrapping, and Boolean operations by corefinement.
 //   cgal_peer garland-heckbert IN.obj OUT.obj NUMBER        a share of the triangles, or from 1 on how many
 //   stay cgal_peer lindstrom-turk IN.obj OUT.obj NUMBER          the same cgal_peer envelope IN.obj OUT.obj
 //   TOLERANCE             as far as an envelope of that width allows; world units cgal_peer alpha-wrap IN.obj
 //   OUT.obj ALPHA OFFSET        world units
+//   cgal_peer union|intersection|difference IN.obj OUT.obj SECOND.obj
 #include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
+#include <CGAL/Polygon_mesh_processing/corefinement.h>
 #include <CGAL/Polygon_mesh_processing/orient_polygon_soup.h>
 #include <CGAL/Polygon_mesh_processing/polygon_soup_to_polygon_mesh.h>
 #include <CGAL/Surface_mesh.h>
@@ -106,6 +108,21 @@ peers::Mesh alpha_wrap(const peers::Mesh& mesh, double alpha, double offset) {
   return from_cgal(surface);
 }
 
+peers::Mesh combined(const peers::Mesh& first, const peers::Mesh& second, const std::string& operation) {
+  Surface a = to_cgal(first), b = to_cgal(second), result;
+  for (const Surface* surface : {&a, &b})
+    if (!CGAL::is_closed(*surface) || !processing::does_bound_a_volume(*surface))
+      throw std::runtime_error("CGAL cannot take a mesh that does not bound a volume");
+  bool is_manifold = false;
+  peers::measured([&] {
+    is_manifold = operation == "union"          ? processing::corefine_and_compute_union(a, b, result)
+                  : operation == "intersection" ? processing::corefine_and_compute_intersection(a, b, result)
+                                                : processing::corefine_and_compute_difference(a, b, result);
+  });
+  if (!is_manifold) throw std::runtime_error("CGAL cannot make a manifold mesh of the result");
+  return from_cgal(result);
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -114,8 +131,10 @@ int main(int argc, char** argv) {
     if (argc != (method == "alpha-wrap" ? 6 : 5))
       throw std::runtime_error(
           "cgal_peer garland-heckbert|lindstrom-turk|envelope IN OUT NUMBER, or alpha-wrap IN OUT ALPHA "
-          "OFFSET");
+          "OFFSET, or union|intersection|difference IN OUT SECOND");
     const peers::Mesh mesh = peers::read_obj(argv[2]);
+    if (method == "union" || method == "intersection" || method == "difference")
+      return peers::write_obj(argv[3], combined(mesh, peers::read_obj(argv[4]), method));
     const double number = std::atof(argv[4]);
     peers::write_obj(argv[3], method == "garland-heckbert" ? garland_heckbert(mesh, number)
                               : method == "lindstrom-turk" ? lindstrom_turk(mesh, number)

@@ -127,6 +127,29 @@ class Rates(unittest.TestCase):
         self.assertEqual(line[:3], ["| a", "all meshes", "4"])
         self.assertEqual([cell.split()[0] for cell in line[3:8]], ["75.0", "50.0", "25.0", "50.0", "33.3"])
 
+    def test_table_of_simplification(self):
+        rows = [row_of(distance=0.5), row_of(sha="2", distance=1.5), row_of(sha="3", status="refused")]
+        text = rates.table(rows, ["a"], "simplify").splitlines()
+        line = dict(zip(text[0].split(" | "), text[-1].split(" | ")))
+        self.assertTrue(line["valid and within the bound %"].startswith("33.3 "))
+        self.assertTrue(line["over the bound %"].startswith("50.0 "))
+        self.assertEqual((line["median % of the bound"], line["median % of the model's triangles"]),
+                         ("100", "833.3"))
+        self.assertEqual(rates.trouble(rows[1])[1], "1.50 times the bound")
+
+    def test_volumes_of_pairs_add_up(self):
+        def of(operation, volume, method="a"):
+            return row_of(method, operation[0], **{"class": operation}, pair="p", volumes=[8.0, 4.0],
+                          wrong=0.0, volume=volume)
+        rows = [of("union", 11.0), of("intersection", 1.0), of("difference", 7.6), of("union", 11.0, "b")]
+        self.assertEqual([round(error, 9) for error in sorted(rates.volume_errors(rows[:3]))], [0, 0.05])
+        self.assertEqual(rates.volume_errors(rows[3:]), [])
+        lines = rates.table(rows, ["a", "b"], "combine").splitlines()
+        cells = [dict(zip(lines[0].split(" | "), line.split(" | "))) for line in lines]
+        found = {(c["| method"], c["class"]): c["volumes differ > 1%"].split()[0] for c in cells[2:]}
+        self.assertEqual(found[("| a", "all meshes")], "50.0")
+        self.assertEqual(found[("| b", "all meshes")], "–")
+
     def test_profile(self):
         # b takes twice as long as a on model 1, half as long on model 2; only a solves 3, no method solves 4.
         rows = [row_of("a", "1"), row_of("b", "1", cpu_seconds=2), row_of("a", "2", cpu_seconds=4),
@@ -167,7 +190,7 @@ class Rates(unittest.TestCase):
 
 class Experiments(unittest.TestCase):
     def test_files_of_the_project(self):
-        for file in (ROOT / "experiments/lab/questions").glob("wild*.toml"):
+        for file in (ROOT / "experiments/lab/questions").glob("*.toml"):
             self.assertIn("method", benchmark.read_experiment(file))
 
     def test_methods(self):
@@ -183,6 +206,12 @@ class Experiments(unittest.TestCase):
                 with self.subTest(method) if is_right else self.assertRaises(LabError):
                     benchmark.read_experiment(file)
             file.write_text(head + 'request = ["a"]')
+            for task, is_right in (('task = "simplify"\nerror = 0.1', True), ('task = "simplify"', False),
+                                   ('task = "paint"', False)):
+                other = pathlib.Path(work) / "c.toml"
+                other.write_text(f'base = "a.toml"\n{task}')
+                with self.subTest(task) if is_right else self.assertRaises(LabError):
+                    benchmark.read_experiment(other)
             other = pathlib.Path(work) / "b.toml"
             other.write_text('base = "a.toml"\nresolution = 5')
             self.assertEqual(benchmark.read_experiment(other)["resolution"], 5)
@@ -223,6 +252,44 @@ class Polygons(unittest.TestCase):
         self.assertEqual(polygons.picture(corners, ([0, 0, 0], [2, 2, 2]))[:4], b"\x89PNG")
         self.assertEqual(polygons.thin_share(corners, 0.1), 0)
         self.assertEqual(polygons.thin_share(corners, 2.1), 1)
+
+
+class Solids(unittest.TestCase):
+    def setUp(self):
+        with tempfile.TemporaryDirectory() as work:
+            files = [pathlib.Path(work) / name for name in ("a.off", "b.off")]
+            for file, text in zip(files, (CUBE, SHIFTED)):
+                file.write_text(text)
+            self.cube, self.shifted = (polygons.read(file)[0] for file in files)
+
+    def test_wrong_volume(self):
+        self.assertAlmostEqual(abs(polygons.volume(self.shifted)), 8)
+        common = 1.9 * 2 * 2
+        for operation, expected in (("union", (8 - common) / (16 - common)),
+                                    ("intersection", (8 - common) / common),
+                                    ("difference", common / (8 - common))):
+            found = polygons.wrong_share(self.cube, self.shifted, self.cube, operation)
+            self.assertAlmostEqual(found / expected, 1, delta=0.3)
+        self.assertEqual(polygons.wrong_share(self.cube, self.cube, self.cube, "union"), 0)
+        self.assertEqual(polygons.wrong_share(self.cube, self.cube, self.cube, "difference"), 1)
+
+    def test_placed_solids_meet(self):
+        inverted = self.shifted[:, ::-1]
+        for seed in range(4):
+            first, second = polygons.place(self.cube, 100 * inverted, seed)
+            self.assertGreater(min(map(polygons.volume, (first, second))), 7.9)
+            self.assertGreater(polygons.wrong_share(first, second, first, "difference"), 1e-3)  # they overlap
+
+    def test_pairs(self):
+        entries = [corpus.Entry("p", "1", f"f{i}", f"{i:064}", "off" if i % 2 else "gltf", 1, "none")
+                   for i in range(20)]
+        pairs = corpus.pairs(entries, 10, 1)
+        self.assertEqual([pair.operation for pair in pairs[:3]], list(corpus.OPERATIONS))
+        self.assertEqual(len({pair.sha256 for pair in pairs}), 30)
+        self.assertEqual(len(corpus.pairs(entries, 100, 1)), 3 * 90)
+        self.assertTrue(all(pair.first.format == pair.second.format == "off" for pair in pairs))
+        self.assertEqual([pair.sha256 for pair in corpus.pairs(entries[::-1], 5, 1)],
+                         [pair.sha256 for pair in pairs[:15]])
 
 
 class Protocol(unittest.TestCase):
@@ -266,7 +333,7 @@ class Benchmark(unittest.TestCase):
         return {"name": name, "adapter": ["python3", str(file)]}
 
     def run_methods(self, methods, models=(CUBE,), out="out", jobs=1, shard="", chosen=slice(None),
-                    **changes):
+                    are_pairs=False, **changes):
         entries = []
         for number, model in enumerate(models):
             name = "model.obj" if model.startswith("v ") else "model.off"
@@ -274,6 +341,8 @@ class Benchmark(unittest.TestCase):
             path = corpus.location(entries[-1], self.work / "cache")
             path.parent.mkdir(parents=True, exist_ok=True)
             path.write_text(model)
+        if are_pairs:
+            entries = [corpus.Pair(*entries, operation, 3) for operation in corpus.OPERATIONS]
         experiment = {"question": "", "resolution": 20, "seed": 7, "seconds": 30, "memory_mib": 4096,
                       "method": methods, **changes}
         run = benchmark.Benchmark(experiment, HERMESH, self.work / out, self.said.append, shard)
@@ -362,6 +431,43 @@ class Benchmark(unittest.TestCase):
             else:
                 self.assertAlmostEqual(request["error"], 0.02 * 3**0.5)
                 self.assertIsNone(voxel)
+
+    def test_simplification_is_measured_against_the_bound(self):
+        scripts = {"copy": "write(CUBE); end(claims=dict(distance_from_input=request['error']))",
+                   "far": "write(SHIFTED); end()",
+                   "false": "write(SHIFTED); end(claims=dict(distance_to_input=request['error']))",
+                   "asked": "end('refused', message=request['task'])"}
+        rows = self.run_methods([self.adapter(*script) for script in scripts.items()], task="simplify",
+                                error=0.01)
+        self.assertEqual(rows[3]["message"], "simplify")
+        self.assertEqual([row["failed_claims"] for row in rows[:3]], [[], [], ["distance_to_input"]])
+        self.assertEqual(rows[0]["distance"], 0)
+        self.assertGreater(rows[1]["distance"], 0.1 / (0.02 * 3**0.5))
+        self.assertEqual([row["near"] for row in rates.counted(rows)], [True, False, False, False])
+
+    def test_combinations(self):
+        copy = """rows = [line.split() for line in open(request['input'])]
+write("\\n".join(["OFF", "8 12 0", *(" ".join(row[1:]) for row in rows if row[0] == "v"),
+                 *("3 %d %d %d" % tuple(int(v) - 1 for v in row[1:]) for row in rows if row[0] == "f")]))
+end(claims=dict(watertight=True))"""
+        right = {"name": "hermesh", "claims": {"watertight": True},
+                 "request": ["{hermesh}", "combine", "{operation}", "{input}", "{second}", "{output}",
+                             "--voxel-size", "{voxel}"]}
+        rows = self.run_methods([right, self.adapter("copy", copy),
+                                 self.adapter("open", copy.replace('"f")]))', '"f")]), 11)'))],
+                                [CUBE, SHIFTED], task="combine", resolution=100, are_pairs=True)
+        found = {(row["method"], row["class"]): row for row in rates.counted(rows)}
+        self.assertEqual(len(found), 9)
+        for operation in corpus.OPERATIONS:
+            self.assertTrue(found["hermesh", operation]["near"], found["hermesh", operation])
+            self.assertFalse(found["copy", operation]["near"])
+            self.assertEqual(found["copy", operation]["failed_claims"], [])
+            self.assertEqual(found["open", operation]["failed_claims"], ["watertight"])
+        self.assertLess(max(rates.volume_errors([r for r in rows if r["method"] == "hermesh"])), 0.01)
+        # The identities cannot reveal a mesh that is the same for all operations and large enough.
+        self.assertGreater(max(rates.volume_errors([r for r in rows if r["method"] == "copy"])), 0.1)
+        rates.write_report(rows, ["hermesh", "copy"], {"hermesh"}, "Why?", self.work / "out", "combine")
+        self.assertIn("of the volume wrong", (self.work / "out/gallery.html").read_text())
 
     def test_claims_of_requests(self):
 

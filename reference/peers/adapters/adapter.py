@@ -59,6 +59,12 @@ def node(script):
     return [program("node", "install the package nodejs"), "--disable-wasm-trap-handler", PEERS / script]
 
 
+def peer_program(name):
+    """Returns the path of a peer in C++, in $HERMESH_PEERS or build/release/reference/peers."""
+    directory = os.environ.get("HERMESH_PEERS", f"{BUILD}/reference/peers")
+    return program(f"{directory}/{name}", "build the target peers")
+
+
 def length(request):
     """Returns the voxel size, which is the requested error for programs without an error bound."""
     return request.get("voxel_size") or request["error"]
@@ -153,16 +159,19 @@ def with_arrays(remesh, **claims):
 
 
 def with_files(request, command, refusal=None, **claims):
-    """Runs a peer whose arguments contain IN.obj or IN.ply, and OUT.obj, and which may print its seconds. A
-    message that contains the text `refusal` means that the program refuses the input.
+    """Runs a peer whose arguments contain IN.obj or IN.ply, OUT.obj, and SECOND.obj if there are two inputs,
+    and which may print its seconds. A message that contains the text `refusal` means that the program refuses
+    the input.
     """
     points, triangles = read_mesh(request["input"])
     with tempfile.TemporaryDirectory() as work:
-        names = {name: os.path.join(work, name) for name in ("IN.obj", "IN.ply", "OUT.obj")}
+        names = {name: os.path.join(work, name) for name in ("IN.obj", "IN.ply", "SECOND.obj", "OUT.obj")}
         if "IN.ply" in command:
             write_ply(names["IN.ply"], points, [triangles])
         else:
             peer.write_obj(names["IN.obj"], points, triangles)
+        if "SECOND.obj" in command:
+            peer.write_obj(names["SECOND.obj"], *read_mesh(request["second"]))
         words = [names.get(word, str(word)) for word in command]
         done = subprocess.run(words, capture_output=True, text=True, errors="replace")
         if refusal and refusal in done.stderr:

@@ -1,9 +1,10 @@
-"""Blender's modifier Remesh: blender.py voxel|sharp [ADAPTIVITY] REQUEST
+"""Blender's modifiers Remesh and Boolean: blender.py voxel|sharp|boolean [ADAPTIVITY] REQUEST
 
 Modes Voxel and Sharp with their defaults (User Manual, Modeling, Modifiers, Remesh), except that Remove
 Disconnected is off in mode Sharp: by default it removes all bodies but the largest. Octree depth and scale
 give cells of the requested size. The manual promises "a new manifold mesh" in mode Voxel, and nothing in mode
-Sharp.
+Sharp. The modifier Boolean has the solver Exact and its other defaults. Its polygons have many corners, and
+are split with the default of the modifier Triangulate for them, Beauty. The manual promises no topology.
 """
 import sys
 
@@ -15,7 +16,10 @@ def work(request):
     blender = adapter.program("blender", "install the package blender")
     command = [blender, "--background", "--factory-startup", "--threads", request.get("threads") or 0,
                "--python-exit-code", "1", "--python", adapter.PEERS / "blender_peer.py", "--", "IN.obj",
-               "OUT.obj", adapter.length(request), "sharp" if mode == "sharp" else adaptivity]
+               "OUT.obj"]
+    if mode == "boolean":
+        return adapter.with_files(request, [*command, request["operation"], "SECOND.obj"])
+    command += [adapter.length(request), "sharp" if mode == "sharp" else adaptivity]
     return adapter.with_files(request, command, **({"manifold": True} if mode == "voxel" else {}))
 
 

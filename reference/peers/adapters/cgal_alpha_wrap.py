@@ -11,7 +11,6 @@ have a circumradius smaller than alpha (Alpha); so each point of the mesh is wit
 input. Nothing bounds the distance from the input to the mesh, because inner walls and narrow cavities are
 covered.
 """
-import os
 import sys
 
 import adapter
@@ -22,11 +21,9 @@ RATIO = 1 / 30
 def work(request):
     voxels = float(sys.argv[1]) if len(sys.argv) > 2 else 1.0
     alpha = request["error"] / (1 + RATIO) if request.get("error") else request["voxel_size"] * voxels
-    directory = os.environ.get("HERMESH_PEERS", f"{adapter.BUILD}/reference/peers")
-    program = adapter.program(f"{directory}/cgal_peer", "build the target peers")
-    return adapter.with_files(request, [program, "alpha-wrap", "IN.obj", "OUT.obj", alpha, alpha * RATIO],
-                              watertight=True, manifold=True, intersection_free=True,
-                              distance_to_input=alpha * (1 + RATIO))
+    command = [adapter.peer_program("cgal_peer"), "alpha-wrap", "IN.obj", "OUT.obj", alpha, alpha * RATIO]
+    return adapter.with_files(request, command, watertight=True, manifold=True,
+                              intersection_free=True, distance_to_input=alpha * (1 + RATIO))
 
 
 adapter.run(work)
