@@ -209,11 +209,11 @@ class Benchmark:
             self._say(f"{where}, {row['method']}: {row['status']}{text}")
 
     def _file(self, name):
-        return self.out / f"{name}{self.shard}.jsonl"
+        return self.out / f"{name}{self.shard}.ndjson"
 
     def _read(self, name):
         # The last line is incomplete if the run was interrupted while it was written.
-        return [json.loads(line) for file in sorted(self.out.glob(f"{name}*.jsonl"))
+        return [json.loads(line) for file in sorted(self.out.glob(f"{name}*.ndjson"))
                 for line in file.read_text().splitlines(keepends=True) if line.endswith("\n")]
 
     def _ask(self, *arguments, reason=None):

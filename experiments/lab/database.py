@@ -1,11 +1,13 @@
 """Rows as tables of SQL, so that a claim or a number of the text is a query that anyone can read and repeat.
 """
 
+import json
 import pathlib
 import re
 import sqlite3
 import statistics
 
+from . import rates
 from .rows import (LabError, all_columns, common_columns, find, is_stand_in, latest_groups, own_columns,
                    read_rows, to_json, value_of)
 
@@ -29,12 +31,16 @@ class RowDatabase:
     of columns.toml, stand_in, broken (number of broken guarantees) and row (all of it as JSON), then the
     columns of reports that some row has, then those that measurements bring along; a measurement's column
     replaces one of the same name. Missing values are NULL, true is 1. In addition to SQLite's functions there
-    is the aggregate median().
+    are the aggregate median() and rate(count, of), a percentage with its Wilson interval at 95 % as text.
+
+    Rows of a benchmark (rates.py) are a table as well, with the columns done, valid, near and fails_a_claim,
+    and those of the models; the names of their other columns have _ for spaces.
     """
 
     def __init__(self):
         self.connection = sqlite3.connect(":memory:", isolation_level=None)
         self.connection.create_aggregate("median", 1, _Median)
+        self.connection.create_function("rate", 2, rates.rate, deterministic=True)
         if hasattr(self.connection, "setconfig"):  # Python 3.12: a misspelt column must not pass for a text
             self.connection.setconfig(sqlite3.SQLITE_DBCONFIG_DQS_DML, False)
         self.tables = []
@@ -54,23 +60,37 @@ class RowDatabase:
         for row in shown:
             for column in own_columns(row):
                 names.setdefault(column.name.lower(), column.name)
-        columns = ", ".join('"' + column.replace('"', '""') + '"' for column in names.values())
-        self.connection.execute(f'CREATE TABLE "{name}" ({columns})')
-        marks = ", ".join("?" * len(names))
-        self.connection.executemany(f'INSERT INTO "{name}" VALUES ({marks})',
-                                    ([_bound(found.get(name)) for name in names]
-                                     for found in map(values, shown)))
+        self._create(name, names, map(values, shown))
         self.tables.append(name)
         self.rows_of[name] = rows
 
+    def _create(self, table, names, rows):
+        """Creates a table; `names` maps the keys of the rows to the names of the columns."""
+        columns = ", ".join('"' + column.replace('"', '""') + '"' for column in names.values())
+        self.connection.execute(f'CREATE TABLE "{table}" ({columns})')
+        marks = ", ".join("?" * len(names))
+        self.connection.executemany(f'INSERT INTO "{table}" VALUES ({marks})',
+                                    ([_bound(row.get(name)) for name in names] for row in rows))
+
+    def add_benchmark(self, directory):
+        """Adds the rows of a benchmark as a table with the name of the directory."""
+        read = lambda name: [json.loads(line) for file in sorted(directory.glob(f"{name}*.ndjson"))
+                             for line in file.read_text().splitlines()]
+        models = {model["sha256"]: model for model in read("models")}
+        rows = rates.counted([{**models[row["sha256"]], **row} for row in read("rows")])
+        names = {key: key.replace(" ", "_") for row in rows for key in row}
+        self._create(directory.name, names, rows)
+
     def add_directories(self, results):
-        """Adds each directory directly below `results` that has a rows.jsonl, except "local"."""
+        """Adds each directory directly below `results` that has rows, except "local"."""
         if not pathlib.Path(results).is_dir():
             raise LabError(f"there is no directory {results}")
         self.connection.execute("BEGIN")
         for file in sorted(pathlib.Path(results).glob("*/rows.jsonl")):
             if file.parent.name != "local":
                 self.add(file.parent.name, read_rows(file))
+        for directory in sorted({file.parent for file in pathlib.Path(results).glob("*/rows*.ndjson")}):
+            self.add_benchmark(directory)
         self.connection.execute("COMMIT")
 
     def query(self, text, bound={}):

@@ -13,6 +13,7 @@ from unittest import mock
 import numpy
 
 from .. import benchmark, child, corpus, polygons, protocol, rates
+from ..database import RowDatabase
 from ..rows import ROOT, LabError
 
 HERMESH = os.environ.get("HERMESH")
@@ -179,7 +180,7 @@ class Rates(unittest.TestCase):
             slower = row_of(cpu_seconds=2, peak_mib=1, failed_claims=["seconds"])
             for folder, rows in zip(folders, ([row_of()], [slower], [row_of(triangles=99), row_of("b")])):
                 folder.mkdir()
-                (folder / "rows-1-of-2.jsonl").write_text("".join(json.dumps(row) + "\n" for row in rows))
+                (folder / "rows-1-of-2.ndjson").write_text("".join(json.dumps(row) + "\n" for row in rows))
             self.assertEqual(rates.differences(folders[0], folders[1]), [])
             found = rates.differences(folders[0], folders[2])
             self.assertEqual([line.split(": ", 1)[1] for line in found],
@@ -499,7 +500,7 @@ end(claims=dict(watertight=True))"""
         self.run_methods(methods, models, "whole")
         self.run_methods(methods, models, "parts", 2, "-1-of-2", slice(0, None, 2))
         self.run_methods(methods, models, "parts", 1, "-2-of-2", slice(1, None, 2))
-        self.assertEqual(len(list((self.work / "parts").glob("rows*.jsonl"))), 2)
+        self.assertEqual(len(list((self.work / "parts").glob("rows*.ndjson"))), 2)
         self.assertEqual(rates.differences(self.work / "whole", self.work / "parts"), [])
         self.said.clear()
         rows = self.run_methods(methods, models, "parts")
@@ -508,6 +509,12 @@ end(claims=dict(watertight=True))"""
         self.assertIn("Not installed, and left out: absent.", (self.work / "parts/table.md").read_text())
         self.assertIn("<svg", (self.work / "parts/profiles.svg").read_text())
         self.assertIn("data:image/png", (self.work / "parts/gallery.html").read_text())
+        database = RowDatabase()
+        database.add_directories(self.work)
+        query = """SELECT method, sum(done), rate(sum(valid), count(*)) FROM parts WHERE class = 'clean solid'
+                   GROUP BY method"""
+        self.assertEqual(database.query(query)[1],
+                         [("cube", 3, "100.0 [43.9, 100.0]"), ("refuses", 0, "0.0 [0.0, 56.1]")])
 
     def test_rows_are_resumed_and_outputs_validated(self):
         with tempfile.TemporaryDirectory() as work:
@@ -531,7 +538,7 @@ end(claims=dict(watertight=True))"""
             self.assertEqual(rows[0]["triangles"], 12)
             self.assertLess(rows[0]["lost"] + rows[0]["invented"], 1e-3)
             # A line that was cut off is written again, complete ones are not.
-            file = out / "rows.jsonl"
+            file = out / "rows.ndjson"
             lines = file.read_text().splitlines(keepends=True)
             file.write_text("".join(lines[:3]) + lines[3][:20])
             said.clear()
