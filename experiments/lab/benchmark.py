@@ -156,7 +156,7 @@ class Benchmark:
     def __init__(self, experiment, hermesh, out, say, shard=""):
         self.experiment, self.hermesh, self.out = experiment, hermesh, pathlib.Path(out)
         self.shard, self._say = shard, say
-        self.task = experiment.get("task", "remesh")
+        self.task, self.build = experiment.get("task", "remesh"), build_of(hermesh)
         self.out.mkdir(parents=True, exist_ok=True)
         self.limits = child.Limits(experiment["seconds"], experiment["memory_mib"])
 
@@ -257,7 +257,7 @@ class Benchmark:
     def _run_method(self, model, path, method):
         with tempfile.TemporaryDirectory() as work:
             row, output = self._measure(model, path, method, work)
-            row = {"sha256": model["sha256"], "method": method["name"], **row}
+            row = {"sha256": model["sha256"], "method": method["name"], "commit": self.build["commit"], **row}
             if "message" in row:  # must not depend on directories of this machine
                 row["message"] = row["message"].replace(f"{work}/", "").replace(f"{path.parent}/", "")[:500]
             if row["status"] != "not installed" and rates.trouble(row):
@@ -414,12 +414,18 @@ def add_command(subparsers):
     parser.set_defaults(function=run)
 
 
-def _provenance(hermesh):
+def build_of(hermesh):
+    """Returns the version and the commit of a program, which it prints on two lines."""
+    version, commit, *_ = child.run([hermesh, "--version"], VALIDATION).output.splitlines() + ["", ""]
+    return {"version": version, "commit": commit.removeprefix("commit ")}
+
+
+def _provenance(build):
     """Returns the date, the build of the program that validates, and the processor, as text."""
-    version = child.run([hermesh, "--version"], VALIDATION).output.splitlines()
     with open("/proc/cpuinfo") as file:
         names = [line.partition(":")[2].strip() for line in file if line.startswith("model name")]
-    return ", ".join([f"{datetime.date.today()}", *version[:2], *names[:1], f"{len(names)} cores"])
+    return ", ".join([f"{datetime.date.today()}", build["version"], f"commit {build['commit']}", *names[:1],
+                      f"{len(names)} cores"])
 
 
 def _parse_shard(text):
@@ -477,7 +483,7 @@ def run(arguments):
     rows = benchmark.run(entries, cache, arguments.jobs)
     ours = {m["name"] for m in experiment["method"] if m["name"].startswith("hermesh")}
     rates.write_report(rows, [m["name"] for m in experiment["method"]], ours, experiment["question"], out,
-                       benchmark.task, _provenance(hermesh))
+                       benchmark.task, _provenance(benchmark.build))
     print((out / "table.md").read_text())
     say(f"Table, profiles and worst cases: {out}/table.md, profiles.svg, gallery.html")
     return 0

@@ -45,6 +45,7 @@ class RowDatabase:
             self.connection.setconfig(sqlite3.SQLITE_DBCONFIG_DQS_DML, False)
         self.tables = []
         self.rows_of = {}  # all rows of each table, earlier runs included
+        self.benchmarks = []  # tables of benchmarks, which are not in `tables`
 
     def add(self, name, rows):
         """Adds the table `name`. Raises LabError if there is one of that name."""
@@ -80,6 +81,7 @@ class RowDatabase:
         rows = rates.counted([{**models[row["sha256"]], **row} for row in read("rows")])
         names = {key: key.replace(" ", "_") for row in rows for key in row}
         self._create(directory.name, names, rows)
+        self.benchmarks.append(directory.name)
 
     def add_directories(self, results):
         """Adds each directory directly below `results` that has rows, except "local"."""
@@ -115,7 +117,7 @@ class RowDatabase:
 
     def tables_in(self, query):
         """Returns the sorted names of the tables that occur in a query."""
-        return sorted(set(re.findall(r"\w+", query)) & set(self.tables))
+        return sorted(set(re.findall(r"\w+", query)) & {*self.tables, *self.benchmarks})
 
 
 def value(row, name):

@@ -22,7 +22,7 @@ LOSS = INVENTED = 0.01  # shares of the visible surface, and of the output, abov
 NEAR = {"remesh": "valid and near %", "simplify": "valid and within the bound %",
         "combine": "valid and right %"}
 WORST = 300  # cases in the gallery
-VARYING = {"cpu_seconds", "wall_seconds", "seconds", "peak_mib"}  # from day to day
+VARYING = {"cpu_seconds", "wall_seconds", "seconds", "peak_mib", "commit"}  # from day to day
 
 
 def rate(count, of):
