@@ -383,7 +383,8 @@ class Run:
             print(f"Shard {number}/{of}: {len(self.rows)} of {len(self.manifest['cells'])} cells", file=out)
         if self.reused:
             self.notes.setdefault(f"{self.reused} of {len(self.rows)} cells were in {file} already, made by "
-                                  "this program of the same data; --again makes them again")
+                                  "this program of the same data, with the columns and plots of that run; "
+                                  "--again makes them again, with those of the file")
         print(f"Rows: {file}; pictures: {self.shown / '*.png'}", file=out)
         if not self.arguments.shard:
             tables.write_plots(read_rows(self.file), self.out, out)
