@@ -226,17 +226,25 @@ def first_hit(corners, origin, direction, after):
         return t[(u >= 0) & (v >= 0) & (u + v <= 1) & (t > after)].min(initial=numpy.inf)
 
 
-def distant_visible_points(model, is_triangle, output, count=64, rays=16):
-    """Returns those of the model's most distant samples from the output from which two rays leave the model.
+def distant_visible_points(model, is_triangle, output, limit, count=256, rays=16):
+    """Returns samples of the model from which two rays leave it, of those farther than `limit` from the output.
 
     Samples are vertices and points within triangles, which do not depend on the triangulation of polygons.
+    `count` of them are tested: a quarter are the farthest ones, and the others are spread over the rest,
+    since the farthest ones may all be hidden.
     """
     within = samples(model[is_triangle], 20_000)[0]
     points = numpy.unique(numpy.concatenate([model.reshape(-1, 3), within]), axis=0)
     known = samples(output, 50_000)[0]
     if not len(known):
         return points[:0]
-    points = points[numpy.argsort(-cKDTree(known).query(points)[0])[:count]]
+    distances = cKDTree(known).query(points)[0]
+    order = numpy.argsort(-distances)[:numpy.count_nonzero(distances > limit)]
+    rest = order[count // 4:]
+    spread = rest[numpy.linspace(0, len(rest) - 1, min(len(rest), 3 * count // 4)).astype(int)]
+    points = points[numpy.concatenate([order[:count // 4], spread])]
+    if not len(points):
+        return points
     directions = numpy.random.default_rng(0).normal(size=(rays, 3))
     directions /= numpy.linalg.norm(directions, axis=1)[:, None]
     after = 1e-7 * numpy.ptp(model.reshape(-1, 3), axis=0).max()

@@ -76,7 +76,7 @@ def failed_claims(claims, seconds, ended, mib, report, scale, ask, model, output
     for name, key in DISTANCES.items():
         limit = claims.get(name, math.inf) * (1 + SLACK) + ROUNDING * scale
         if key in report and distance(report, key, limit, ask, model) > limit \
-                and (key == "to_reference" or visible_distance(ask, model, output, scale) > limit):
+                and (key == "to_reference" or visible_distance(ask, model, output, scale, limit) > limit):
             failed.append(name)
     return failed + (["seconds"] if seconds is not None and is_false_time(seconds, ended, mib) else [])
 
@@ -105,13 +105,13 @@ def is_false_time(seconds, ended, mib):
     return seconds > 1.01 * ended.wall_seconds + CLOCK_SECONDS or ended.cpu_seconds > possible
 
 
-def visible_distance(ask, model, output, scale):
+def visible_distance(ask, model, output, scale, limit):
     """Returns a lower bound of the largest distance from visible points of the model to the output.
 
-    It measures the distance of the visible ones of the 64 most distant samples; 0 if there are none.
+    It measures the distances of visible samples that may be farther than the limit; 0 if there are none.
     """
     try:
-        points = polygons.distant_visible_points(*polygons.read(model), polygons.read(output)[0])
+        points = polygons.distant_visible_points(*polygons.read(model), polygons.read(output)[0], limit)
     except ValueError:
         return 0.0  # a format that is not read here: the claim is not checked
     if not len(points):
