@@ -259,7 +259,9 @@ class Benchmark:
             row, output = self._measure(model, path, method, work)
             row = {"sha256": model["sha256"], "method": method["name"], "commit": self.build["commit"], **row}
             if "message" in row:  # must not depend on directories of this machine
-                row["message"] = row["message"].replace(f"{work}/", "").replace(f"{path.parent}/", "")[:500]
+                for folder in (work, path.parent, ROOT):
+                    row["message"] = row["message"].replace(f"{folder}/", "")
+                row["message"] = row["message"][:500]
             if row["status"] != "not installed" and rates.trouble(row):
                 self._draw(model, path, row, output)
         return row

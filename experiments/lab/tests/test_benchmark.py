@@ -399,7 +399,8 @@ class Benchmark(unittest.TestCase):
     def test_how_adapters_end(self):
         methods = [self.adapter(name, script) for name, script in (
             ("refuses", "end('refused', message='too thin')"), ("fails", "sys.exit('no licence')"),
-            ("paths", "sys.exit(request['input'] + ' ' + request['output'])"), ("silent", "pass"),
+            ("paths", f"sys.exit(request['input'] + ' ' + request['output'] + ' {ROOT}/a.py')"),
+            ("silent", "pass"),
             ("malformed", "write(CUBE); end(claims=dict(perfect=True))"), ("no mesh", "end()"),
             ("crash", "os.abort()"),
             ("absent", "print('no blender', file=sys.stderr); sys.exit(77)"))]
@@ -409,7 +410,8 @@ class Benchmark(unittest.TestCase):
         self.assertEqual([row["status"] for row in rows if row["sha256"] == "0" * 64],
                          ["refused", "refused", "refused", "wrong output", "wrong output", "wrong output", "crash"])
         self.assertEqual([row["message"] for row in rows][:4],
-                         ["too thin", "no licence", "model.off out.ply", "no result was written to request.result"])
+                         ["too thin", "no licence", "model.off out.ply a.py",
+                          "no result was written to request.result"])
         absent = [line for line in self.said if "not installed" in line]
         self.assertEqual(len(absent), 3)  # not of the second model
         self.assertIn("no blender", absent[0])
