@@ -364,9 +364,8 @@ class ShellMaker {
     const ShownSurface::Verdict verdict = verdicts_[piece_++];
     // A piece near a lost one may be shown, because it bounds a thick part of the solid.
     if (verdict == ShownSurface::Verdict::hidden || !Near::holds(around_, centre(c))) return {};
-    const bool is_lost = verdict == ShownSurface::Verdict::lost;
-    if (is_lost && thickening_.bounds_filled_space(centre(c), normal_, triangle_, shown_)) return {};
-    const Thickening::Need need = thickening_.need(c, normal_, triangle_, is_lost, mode_, shown_);
+    const Thickening::Need need =
+        thickening_.need(c, normal_, triangle_, verdict == ShownSurface::Verdict::lost, mode_, shown_);
     if (!(need.radius > 0.0)) return {};
     const double area = area_of(c);
     (need.is_gap ? part.merged_area : part.thickened_area) += area;
@@ -434,6 +433,31 @@ std::vector<Vector3d> worth_a_shell(const SurfaceComparison& all, const ShownSur
   return result;
 }
 
+/// Changes lost pieces that bound filled space to hidden ones.
+void hide_in_filled_space(SurfaceComparison& comparison, const Thickening& thickening,
+                          const ShownSurface& shown, RunContext& context) {
+  std::vector<std::uint8_t> is_hidden(comparison.lost.size());
+  parallel_blocks(
+      comparison.lost.size(), context,
+      [&](std::size_t i) {
+        const LostPiece& piece = comparison.lost[i];
+        is_hidden[i] = thickening.bounds_filled_space(piece.at, piece.normal, piece.triangle, shown);
+      },
+      256);
+  std::vector<LostPiece> lost;
+  std::size_t i = 0;  // the verdicts have the order of the lost pieces
+  for (std::vector<ShownSurface::Verdict>& task : comparison.verdicts)
+    for (ShownSurface::Verdict& verdict : task) {
+      if (verdict != ShownSurface::Verdict::lost) continue;
+      if (is_hidden[i])
+        verdict = ShownSurface::Verdict::hidden;
+      else
+        lost.push_back(comparison.lost[i]);
+      ++i;
+    }
+  comparison.lost = std::move(lost);
+}
+
 /// Adds the shell that a solid needs to show all polygons.
 std::optional<ThinParts> thicken(const PolygonMesh& mesh, SampledSolid& solid, ThinRule rule,
                                  RunContext& context) {
@@ -444,9 +468,7 @@ std::optional<ThinParts> thicken(const PolygonMesh& mesh, SampledSolid& solid, T
   SurfaceComparison comparison = compare_with_solid(mesh, shown, voxel_size, context);
   if (comparison.lost.empty() && comparison.pierced.empty()) return std::nullopt;
   const Thickening thickening(mesh, voxel_size);
-  std::erase_if(comparison.lost, [&](const LostPiece& piece) {
-    return thickening.bounds_filled_space(piece.at, piece.normal, piece.triangle, shown);
-  });
+  hide_in_filled_space(comparison, thickening, shown, context);
   std::vector<Vector3d> lost = worth_a_shell(comparison, shown, thickening);
   // The boundary of a narrow hole shows the polygons within it.
   for (const LostPiece& piece : comparison.pierced)
