@@ -115,7 +115,7 @@ PolygonMesh extract_surface(const LevelSet& volume, const PolygonMesh* source, c
   context.check();
   // No reader accepts a mesh file without polygons, ours included.
   if (made.mesh.empty() && recipe.field && recipe.field->outside == AdaptivityField::Outside::nothing)
-    throw Error("there is no surface inside the mask, nothing was written");
+    throw Error("the mask contains no part of the surface, so nothing was written");
   if (made.mesh.empty())
     throw Error(no_surface(volume, recipe.isovalue, source || recipe.hermite, recipe.chosen.extractor.name));
   if (!recipe.ends) return std::move(made.mesh);

@@ -95,7 +95,7 @@ MadeSolid make_solid(const PolygonMesh& mesh, const VoxelizeRecipe& recipe, RunC
 EndedMesh extract(const LevelSet& volume, const PolygonMesh* source, const ExtractRecipe& recipe,
                   RunContext& context);
 /// Converts a volume to a mesh with polygons, as extract(). Adds a note if the surface runs into the end of
-/// the data. @throws Error also if there is no surface, with the reason
+/// the data. @throws Error also for an empty mesh, with the reason
 PolygonMesh extract_surface(const LevelSet& volume, const PolygonMesh* source, const ExtractRecipe& recipe,
                             RunContext& context);
 

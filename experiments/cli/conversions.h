@@ -65,7 +65,7 @@ MadeSolid make_solid(const PolygonMesh& mesh, const std::string& name, const Vox
 void print_voxelized(Session& session, const std::string& file, const PolygonMesh& mesh,
                      const VoxelizationFacts& facts, const std::string& voxelizer);
 void print_extracted(Session& session, const PolygonMesh& mesh, const std::string& extractor, double seconds);
-/// Adds statistics of thickened parts, zeros if there are none, to the JSON document.
+/// Adds statistics of thickened parts to the JSON document; they are 0 if no part was thickened.
 void report_thin_parts(const std::optional<ThinParts>& thin, Session& session);
 
 /// Writes the mesh, with the unit of its coordinates if --units is given and the format stores one.

@@ -463,7 +463,7 @@ def run(arguments):
     if arguments.method:
         known = [method["name"] for method in experiment["method"]]
         if unknown := set(arguments.method) - set(known):
-            raise LabError(f"{file}: there is no method {', '.join(unknown)}; expected {', '.join(known)}")
+            raise LabError(f"{file}: unknown method {', '.join(unknown)}; expected {', '.join(known)}")
         experiment["method"] = [m for m in experiment["method"] if m["name"] in arguments.method]
     models = experiment["models"]
     models = arguments.models or (models[arguments.tier] if isinstance(models, dict) else models)

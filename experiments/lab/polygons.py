@@ -31,7 +31,7 @@ def read(path):
     except (LookupError, TypeError, OverflowError, StopIteration, EOFError, gzip.BadGzipFile) as error:
         raise ValueError(f"{path}: the file is damaged: {error}") from None
     if not len(corners) or not numpy.isfinite(corners).all():
-        raise ValueError(f"{path}: there are no polygons, or a coordinate is not finite")
+        raise ValueError(f"{path}: the file has no polygon, or a coordinate is not finite")
     return corners, numpy.broadcast_to(is_triangle, len(corners))
 
 

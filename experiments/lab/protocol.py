@@ -108,7 +108,7 @@ def is_false_time(seconds, ended, mib):
 def visible_distance(ask, model, output, scale, limit):
     """Returns a lower bound of the largest distance from visible points of the model to the output.
 
-    It measures the distances of visible samples that may be farther than the limit; 0 if there are none.
+    It measures the distances of visible samples that may be farther than the limit; 0 without such samples.
     """
     try:
         points = polygons.distant_visible_points(*polygons.read(model), polygons.read(output)[0], limit)

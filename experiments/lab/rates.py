@@ -237,7 +237,7 @@ def write_report(rows, methods, ours, question, out, task="remesh", provenance="
 def _cells(directory):
     files = sorted(pathlib.Path(directory).glob("rows*.ndjson"))
     if not files:
-        raise LabError(f"{directory}: there are no rows of a benchmark (rows*.ndjson)")
+        raise LabError(f"{directory}: no rows of a benchmark were found (rows*.ndjson)")
     rows = [json.loads(line) for file in files for line in file.read_text().splitlines()]
     for row in rows:
         row["failed_claims"] = [name for name in row.get("failed_claims", []) if name not in VARYING]

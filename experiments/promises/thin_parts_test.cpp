@@ -222,7 +222,7 @@ TEST(ThinParts, AreNotAddedWhereThereAreNone) {
   }
 }
 
-TEST(ThinParts, DoNotCloseGapsBesideThem) {
+TEST(ThinParts, DoNotCloseAdjacentGaps) {
   // Plates of 1.15 with gaps of 0.85 between them, in each of which is a layer of samples, and a sheet that
   // connects their ends: only the sheet is lost, and its shell leaves the gaps open.
   MeshFile model;
