@@ -3,6 +3,7 @@
 An experiment file (TOML) has these keys:
 
 base        another file with some of these keys, which this one replaces; its methods follow (optional)
+without     names of methods of the base that are left out (optional)
 question    one sentence
 task        "remesh" (default), "simplify", which requires an error, or "combine"
 corpus      table of files in experiments/data
@@ -63,7 +64,7 @@ def _read_with_base(path):
     if "base" not in experiment:
         return experiment
     base, own = _read_with_base(path.parent / experiment.pop("base")), experiment.get("method", [])
-    names = {method["name"] for method in own}
+    names = {method["name"] for method in own} | set(experiment.pop("without", []))
     own += [method for method in base.get("method", []) if method["name"] not in names]
     return {**base, **experiment, "method": own}
 
@@ -171,7 +172,7 @@ class Benchmark:
         for name in ("models", "rows"):
             if self._file(name).exists():
                 drop_torn_row(self._file(name))
-        done = {(row["sha256"], row["method"]) for row in self._read("rows")}
+        done = {(row["sha256"], row["method"]) for row in rates.read(self.out, "rows")}
         numbers = {entry.sha256: number for number, entry in enumerate(entries, 1)}
         methods = self.experiment["method"]
         work = functools.partial(self._run_model, cache=cache)
@@ -191,16 +192,7 @@ class Benchmark:
             with _pool(jobs) if jobs > 1 else contextlib.nullcontext() as pool:
                 for (entry, _), rows in zip(rest, pool.imap(work, rest) if pool else map(work, rest)):
                     self._report(entry, rows, numbers, len(entries))
-        return [row for row in self.rows() if row["sha256"] in numbers]
-
-    def rows(self):
-        """Returns the rows of all shards with the class, tags and size of their models."""
-        models = {row["sha256"]: row for row in self._read("models")}
-        rows = {(row["sha256"], row["method"]): row for row in self._read("rows")}
-        known = ("class", "tags", "name", "pair", "volumes")
-        return [{**row, **{key: models[sha][key] for key in known if key in models[sha]},
-                 "model_triangles": models[sha]["triangles"]}
-                for (sha, _), row in rows.items() if sha in models]
+        return [row for row in rates.read_with_models(self.out) if row["sha256"] in numbers]
 
     def _report(self, entry, rows, numbers, total):
         for row in rows:
@@ -210,11 +202,6 @@ class Benchmark:
 
     def _file(self, name):
         return self.out / f"{name}{self.shard}.ndjson"
-
-    def _read(self, name):
-        # The last line is incomplete if the run was interrupted while it was written.
-        return [json.loads(line) for file in sorted(self.out.glob(f"{name}*.ndjson"))
-                for line in file.read_text().splitlines(keepends=True) if line.endswith("\n")]
 
     def _ask(self, *arguments, reason=None):
         """Returns the JSON document of a command. If it failed, returns None and appends to `reason`."""
@@ -239,7 +226,7 @@ class Benchmark:
                                      lambda: pair_facts(self._ask, entry, files))
 
     def _run_methods(self, entry, methods, is_first, path, compute_facts):
-        model = next((row for row in self._read("models") if row["sha256"] == entry.sha256), None)
+        model = next((row for row in rates.read(self.out, "models") if row["sha256"] == entry.sha256), None)
         if model is None:
             model = {"sha256": entry.sha256, "package": entry.package, "path": entry.path, "name": entry.name,
                      **compute_facts()}
@@ -335,10 +322,16 @@ class Benchmark:
         row.update(triangles=report["triangles"] + 2 * report["quads"], components=report["components"],
                    watertight=not defects, defects=defects, claims=claims, failed_claims=[])
         if self.task == "simplify":
-            row["distance"] = protocol.share_of_error(report, request["error"], model["largest_coordinate"],
-                                                      ask, path)
+            try:
+                row["distance"] = protocol.share_of_error(report, request["error"],
+                                                          model["largest_coordinate"], ask, path)
+            except LabError as error:
+                return {**row, "status": "wrong output", "message": str(error)}, None
         elif self.task == "combine":
-            solids = (polygons.read(file)[0] for file in (path, request["second"], output))
+            try:
+                solids = [polygons.read(file)[0] for file in (path, request["second"], output)]
+            except ValueError as error:
+                return {**row, "status": "wrong output", "message": str(error)}, None
             row |= {"wrong": polygons.wrong_share(*solids, request["operation"]), "volume": report["volume"]}
         else:  # without visible surface, the shares are undefined and nothing is lost
             row |= {share: report["visible_loss"][f"{share}_share"]["value"] or 0.0
@@ -458,6 +451,9 @@ def run(arguments):
     for program in arguments.program:
         name, _, path = program.partition("=")
         first = experiment["method"][0]
+        if "request" not in first:
+            raise LabError(f"--program needs the arguments of {first['name']}, which has an adapter; state a "
+                           "method with a request first")
         request = [path if word == "{hermesh}" else word for word in first["request"]]
         experiment["method"].append({**first, "name": name, "request": request})
     if arguments.method:

@@ -170,9 +170,10 @@ def _holds(condition, claim, rows):
 
 def _warnings(table, rows):
     found = []
-    for condition, what in (("dirty IS NOT 0", "a tree with changes"), ("stand_in = 1", "stand-ins")):
-        if rows.first_row(f'SELECT 1 FROM "{table}" WHERE {condition}'):
-            found.append(f"{table} has rows of {what}")
+    if rows.has_changed_tree(table):
+        found.append(f"{table} has rows of a tree with changes")
+    if table not in rows.benchmarks and rows.first_row(f'SELECT 1 FROM "{table}" WHERE stand_in = 1'):
+        found.append(f"{table} has rows of stand-ins")
     if stale_row(table, rows):
         found.append(f"{table} has rows that the program no longer makes")
     return found

@@ -1,7 +1,6 @@
 """Rows as tables of SQL, so that a claim or a number of the text is a query that anyone can read and repeat.
 """
 
-import json
 import pathlib
 import re
 import sqlite3
@@ -75,10 +74,7 @@ class RowDatabase:
 
     def add_benchmark(self, directory):
         """Adds the rows of a benchmark as a table with the name of the directory."""
-        read = lambda name: [json.loads(line) for file in sorted(directory.glob(f"{name}*.ndjson"))
-                             for line in file.read_text().splitlines()]
-        models = {model["sha256"]: model for model in read("models")}
-        rows = rates.counted([{**models[row["sha256"]], **row} for row in read("rows")])
+        rows = rates.counted(rates.read_with_models(directory))
         names = {key: key.replace(" ", "_") for row in rows for key in row}
         self._create(directory.name, names, rows)
         self.benchmarks.append(directory.name)
@@ -114,6 +110,13 @@ class RowDatabase:
             return self.connection.execute(statement).rowcount
         except (sqlite3.Error, sqlite3.Warning) as error:
             raise LabError(f"{error} in: {statement}") from None
+
+    def has_changed_tree(self, table):
+        """Returns True if a row was made by a program whose commit had changes."""
+        condition = "dirty IS NOT 0"
+        if table in self.benchmarks:
+            condition = "\"commit\" IS NULL OR \"commit\" LIKE '% %'"
+        return bool(self.first_row(f'SELECT 1 FROM "{table}" WHERE {condition}'))
 
     def tables_in(self, query):
         """Returns the sorted names of the tables that occur in a query."""

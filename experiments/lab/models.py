@@ -79,8 +79,8 @@ def fetch(names, say):
                 if other not in missing and _files(other) and not _is_available(other)]
     wanted = {}
     for name in missing:
-        file = next(file for file in _files(name) if "from" in file)
-        wanted.setdefault(_package(file), file["file"])
+        for file in [file for file in _files(name) if "from" in file][:1]:
+            wanted.setdefault(_package(file), file["file"])
     if not wanted:
         return ""
     if os.environ.get("HERMESH_OFFLINE"):

@@ -159,6 +159,8 @@ def orphans(text, plain):
 def hash_line(root, table):
     """Returns the line of results/SHA256SUMS on a table, as sha256sum prints it."""
     file = f"{table}/rows.jsonl"
+    if not (root / "results" / file).exists():
+        file = f"{table}/rows.ndjson"  # of a benchmark
     return f"{hashlib.sha256((root / 'results' / file).read_bytes()).hexdigest()}  {file}\n"
 
 
@@ -186,9 +188,9 @@ class Pages:
                 for name, rows in self.rows.rows_of.items()}
 
     def sums(self):
-        """Returns the hashes of all rows.jsonl."""
-        return "".join(hash_line(self.root, name)
-                       for name in sorted(self.rows.tables, key=lambda name: name + "/"))
+        """Returns the hashes of all files of rows."""
+        names = [*self.rows.tables, *self.rows.benchmarks]
+        return "".join(hash_line(self.root, name) for name in sorted(names, key=lambda name: name + "/"))
 
     def read(self, file):
         """Returns the text of a file, None if there is none."""

@@ -176,12 +176,13 @@ class Paper:
     @functools.cache
     def trust_table(self, table):
         """Raises LabError if the rows of a directory must not be cited."""
+        line = pages.hash_line(self.root, table)
+        if line not in (self.pages.read("results/SHA256SUMS") or ""):
+            raise LabError(f"results/{line.split()[-1]} differs from the hash in results/SHA256SUMS")
         if table in self.rows.benchmarks:
-            if self.rows.first_row(f'SELECT 1 FROM "{table}" WHERE "commit" IS NULL OR "commit" LIKE "% %"'):
+            if self.rows.has_changed_tree(table):
                 raise LabError(f"results/{table} has rows of a tree with changes")
             return
-        if pages.hash_line(self.root, table) not in (self.pages.read("results/SHA256SUMS") or ""):
-            raise LabError(f"results/{table}/rows.jsonl differs from the hash in results/SHA256SUMS")
         rows = self.rows.rows_of[table]
         if dirty := sum(row.get("dirty") is not False for row in rows):
             raise LabError(f"results/{table} has {dirty} rows of a tree with changes")

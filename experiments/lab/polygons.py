@@ -3,6 +3,7 @@
 import gzip
 import io
 import re
+import zlib
 
 import numpy
 from scipy.spatial import cKDTree
@@ -28,7 +29,8 @@ def read(path):
         with (gzip.open if str(path).lower().endswith(".gz") else open)(path, "rb") as file:
             points, fans, is_triangle = reader(file.read())
         corners = numpy.asarray(points, float).reshape(-1, 3)[numpy.asarray(fans, int).reshape(-1, 3)]
-    except (LookupError, TypeError, OverflowError, StopIteration, EOFError, gzip.BadGzipFile) as error:
+    except (LookupError, TypeError, OverflowError, StopIteration, EOFError, OSError,
+            zlib.error) as error:
         raise ValueError(f"{path}: the file is damaged: {error}") from None
     if not len(corners) or not numpy.isfinite(corners).all():
         raise ValueError(f"{path}: the file has no polygon, or a coordinate is not finite")
@@ -180,11 +182,17 @@ def _crossings(corners, lines):
 def wrong_share(first, second, output, operation, count=1000):
     """Returns the volume in which a mesh differs from the result of an operation, as a share of the result.
 
-    Both volumes are integrated along random vertical lines.
+    Both volumes are integrated along random vertical lines through the box that contains the result. A mesh
+    that leaves this box is wrong by at least the excess of its volume.
     """
-    corners = numpy.concatenate([first, second, output]).reshape(-1, 3)[:, :2]
-    lines = numpy.random.default_rng(0).uniform(corners.min(axis=0), corners.max(axis=0), (count, 2))
-    wrong = total = 0.0  # volumes per area
+    points = [corners.reshape(-1, 3) for corners in (first, second)]
+    lows, highs = [p.min(axis=0) for p in points], [p.max(axis=0) for p in points]
+    low, high = {"union": (numpy.min(lows, axis=0), numpy.max(highs, axis=0)),
+                 "difference": (lows[0], highs[0]),
+                 "intersection": (numpy.max(lows, axis=0), numpy.min(highs, axis=0))}[operation]
+    area = numpy.prod(high[:2] - low[:2]) / count  # that a line represents
+    lines = numpy.random.default_rng(0).uniform(low[:2], high[:2], (count, 2))
+    wrong = total = within = 0.0
     for found in zip(*(_crossings(solid, lines) for solid in (first, second, output))):
         height = numpy.concatenate([z for z, _ in found])
         change = numpy.concatenate([numpy.outer(sign, unit) for (_, sign), unit in zip(found, numpy.eye(3))])
@@ -192,7 +200,12 @@ def wrong_share(first, second, output, operation, count=1000):
         a, b, made = (numpy.cumsum(change[order], axis=0)[:-1] > 0).T
         right = {"union": a | b, "intersection": a & b, "difference": a & ~b}[operation]
         length = numpy.diff(height[order])
-        wrong, total = wrong + length[made != right].sum(), total + length[right].sum()
+        wrong, total, within = (before + area * length[chosen].sum() for before, chosen in (
+            (wrong, made != right), (total, right), (within, made)))
+    sides = output.reshape(-1, 3)
+    margin = 1e-3 * (high - low)
+    if (sides < low - margin).any() or (sides > high + margin).any():
+        wrong += max(0.0, volume(output) - within)
     return float(wrong / total) if total else float(wrong > 0)
 
 

@@ -25,6 +25,24 @@ WORST = 300  # cases in the gallery
 VARYING = {"cpu_seconds", "wall_seconds", "seconds", "peak_mib", "commit"}  # from day to day
 
 
+def read(directory, name):
+    """Returns the "rows" or the "models" of all shards of a benchmark. A last line that is incomplete, since
+    the run was interrupted while it was written, is left out.
+    """
+    return [json.loads(line) for file in sorted(pathlib.Path(directory).glob(f"{name}*.ndjson"))
+            for line in file.read_text().splitlines(keepends=True) if line.endswith("\n")]
+
+
+def read_with_models(directory):
+    """Returns the rows of all shards of a benchmark with the class, tags and size of their models."""
+    models = {row["sha256"]: row for row in read(directory, "models")}
+    rows = {(row["sha256"], row["method"]): row for row in read(directory, "rows")}
+    known = ("class", "tags", "name", "pair", "volumes")
+    return [{**row, **{key: models[sha][key] for key in known if key in models[sha]},
+             "model_triangles": models[sha]["triangles"]}
+            for (sha, _), row in rows.items() if sha in models]
+
+
 def rate(count, of):
     """Returns a percentage with its Wilson interval at 95 % as text."""
     if not of:
@@ -235,10 +253,9 @@ def write_report(rows, methods, ours, question, out, task="remesh", provenance="
 
 
 def _cells(directory):
-    files = sorted(pathlib.Path(directory).glob("rows*.ndjson"))
-    if not files:
+    rows = read(directory, "rows")
+    if not rows:
         raise LabError(f"{directory}: no rows of a benchmark were found (rows*.ndjson)")
-    rows = [json.loads(line) for file in files for line in file.read_text().splitlines()]
     for row in rows:
         row["failed_claims"] = [name for name in row.get("failed_claims", []) if name not in VARYING]
     return {(row["sha256"], row["method"]): {key: value for key, value in row.items() if key not in VARYING}

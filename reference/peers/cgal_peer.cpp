@@ -1,10 +1,13 @@
 // CGAL: edge collapse with Garland and Heckbert's quadrics or Lindstrom and Turk's costs, the latter within a
 // polyhedral envelope, too, alpha wrapping, and Boolean operations by corefinement.
-//   cgal_peer garland-heckbert IN.obj OUT.obj NUMBER        a share of the triangles, or from 1 on how many
-//   stay cgal_peer lindstrom-turk IN.obj OUT.obj NUMBER          the same cgal_peer envelope IN.obj OUT.obj
-//   TOLERANCE             as far as an envelope of that width allows; world units cgal_peer alpha-wrap IN.obj
-//   OUT.obj ALPHA OFFSET        world units
+//
+//   cgal_peer garland-heckbert IN.obj OUT.obj NUMBER
+//   cgal_peer lindstrom-turk IN.obj OUT.obj NUMBER
+//   cgal_peer envelope IN.obj OUT.obj TOLERANCE
+//   cgal_peer alpha-wrap IN.obj OUT.obj ALPHA OFFSET
 //   cgal_peer union|intersection|difference IN.obj OUT.obj SECOND.obj
+//
+// NUMBER is the share of the triangles that remain or, from 1 on, their number; lengths are world units.
 #include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
 #include <CGAL/Polygon_mesh_processing/corefinement.h>
 #include <CGAL/Polygon_mesh_processing/orient_polygon_soup.h>

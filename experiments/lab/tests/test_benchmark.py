@@ -273,6 +273,10 @@ class Solids(unittest.TestCase):
             self.assertAlmostEqual(found / expected, 1, delta=0.3)
         self.assertEqual(polygons.wrong_share(self.cube, self.cube, self.cube, "union"), 0)
         self.assertEqual(polygons.wrong_share(self.cube, self.cube, self.cube, "difference"), 1)
+        # A column of 0.01 × 0.01 × 2 is common, of which the output has half.
+        moved = self.cube + [1.99, 1.99, 0]
+        half = self.cube * [0.005, 0.005, 0.5] + [1.99, 1.99, 0]
+        self.assertAlmostEqual(polygons.wrong_share(self.cube, moved, half, "intersection"), 0.5)
 
     def test_placed_solids_meet(self):
         inverted = self.shifted[:, ::-1]
