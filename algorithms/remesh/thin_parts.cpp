@@ -107,7 +107,7 @@ class Thickening {
       result.wall = wall;
     }
     // A gap in front of a piece that is shown stays open.
-    if (!is_lost && ahead.faces_here && ahead.distance - 2.0 * result.radius < kWideGap) return {};
+    if (!is_lost && gap - 2.0 * result.radius < kWideGap) return {};
     if (gap < kWideGap && 0.5 * gap > result.radius) {
       result.radius = 0.5 * gap + kOff;
       result.is_gap = true;

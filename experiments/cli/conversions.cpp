@@ -147,8 +147,8 @@ PolygonMesh read_polygons(const std::string& path, Session& session, const ReadO
 
 MadeSolid make_solid(const PolygonMesh& mesh, const std::string& name, const VoxelizeArguments& arguments,
                      Session& session) {
-  MadeSolid made = about_file(
-      name, [&] { return hermesh::make_solid(mesh, arguments.recipe(mesh, name), session.context); });
+  const VoxelizeRecipe recipe = arguments.recipe(mesh, name);
+  MadeSolid made = about_file(name, [&] { return hermesh::make_solid(mesh, recipe, session.context); });
   print_voxelized(session, name, mesh, made, arguments.chosen.voxelizer.name);
   report_thin_parts(made.thin, session);
   return made;

@@ -242,10 +242,9 @@ int run_remesh(ConvertArguments& arguments, Session& session) {
   const double max_loss = most_loss(arguments.max_loss, voxelizing.thin ? rule : ThinRule::keep);
   const std::optional<AdaptivityField> field = read_adaptivity(arguments, session);
   const PolygonMesh mesh = read_polygons(paths.in, session);
-  const Remeshed made = about_file(paths.in, [&] {
-    return remesh(mesh, voxelizing.recipe(mesh, paths.in, arguments.isovalue),
-                  extract_recipe(arguments, field), session.context);
-  });
+  const VoxelizeRecipe recipe = voxelizing.recipe(mesh, paths.in, arguments.isovalue);
+  const Remeshed made = about_file(
+      paths.in, [&] { return remesh(mesh, recipe, extract_recipe(arguments, field), session.context); });
   print_voxelized(session, paths.in, mesh, made, voxelizing.chosen.voxelizer.name);
   if (rule != ThinRule::drop) report_thin_parts(made.thin, session);
   print_extracted(session, made.mesh, arguments.extracting.chosen.extractor.name, made.extract_seconds);

@@ -128,10 +128,10 @@ Fracture fracture(const Mesh& mesh, const VoxelizeOptions& voxelizing, const Fra
     check(options);
     PolygonMesh copy;
     const PolygonMesh& polygons = Inside::sampled(mesh, copy);
-    const MadeSolid made = make_solid(polygons, recipe_of(polygons, voxelizing), inner);
+    MadeSolid made = make_solid(polygons, recipe_of(polygons, voxelizing), inner);
     const FloatHermite hermite = options.hermite == "level-set"
                                      ? sample_level_set(made.solid.level_set, 0.0, inner)
-                                     : made.solid.hermite;
+                                     : std::move(made.solid.hermite);
     return broken(hermite, &polygons, options, inner);
   });
 }
