@@ -70,6 +70,12 @@ TEST_F(FractureTest, MeshesCutInPlace) {
   EXPECT_EQ(json.at("pieces")[0].at("name"), "taken by sphere.off");
 }
 
+TEST_F(FractureTest, ThinPartsCannotBeKeptByOtherVoxelizers) {
+  write_cube();
+  fracture(2, "--cutters voronoi:3 --no-picture --voxelizer openvdb --thin keep");
+  EXPECT_FALSE(is_there());
+}
+
 TEST_F(FractureTest, NumbersMustBeFinite) {
   write_cube();
   for (const char* option : {"--roughness", "--mesh-scale", "--impact-radius"})
