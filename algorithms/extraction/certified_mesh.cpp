@@ -114,20 +114,34 @@ FieldAtPoints::Cell FieldAtPoints::cell_at(const Eigen::Vector3d& p) const {
   return cell;
 }
 
-bool FieldAtPoints::in_mask(const Cell& cell) const { return any(inside(cell.lower, cell.mask)); }
-
-bool FieldAtPoints::leaves_out(const Eigen::Vector3d& p) const {
-  return leaves_out_outside() && !in_mask(cell_at(p));
+bool FieldAtPoints::in_mask(const Eigen::Vector3d& p) const {
+  const auto is_in = [&](const Eigen::Vector3d& at) {
+    const Cell cell = cell_at(at);
+    return any(inside(cell.lower, cell.mask));
+  };
+  if (is_in(p)) return true;
+  // A vertex on a face of its cell, except for rounding, is also within it.
+  constexpr double kOnFace = 1e-5;
+  const Eigen::Vector3d off = p - p.array().round().matrix();
+  if (off.cwiseAbs().minCoeff() > kOnFace) return false;
+  for (int corner = 0; corner < 8; ++corner) {
+    Eigen::Vector3d at = p;
+    for (int a = 0; a < 3; ++a) at[a] += corner >> a & 1 ? kOnFace : -kOnFace;
+    if (is_in(at)) return true;
+  }
+  return false;
 }
 
+bool FieldAtPoints::leaves_out(const Eigen::Vector3d& p) const { return leaves_out_outside() && !in_mask(p); }
+
 float FieldAtPoints::tolerance(const Eigen::Vector3d& p, double tolerance) const {
-  const Cell cell = cell_at(p);
   // Outside of the mask the scale does not apply, and a tolerance larger than that of simplification remains.
-  if (simplifies_outside() && !in_mask(cell))
+  if (simplifies_outside() && !in_mask(p))
     return static_cast<float>(std::max(tolerance, kSimplifiedTolerance));
   // Excluded vertices must not be merged with others.
-  if (leaves_out_outside() && !in_mask(cell)) return 0;
+  if (leaves_out_outside() && !in_mask(p)) return 0;
   if (!has_scale()) return static_cast<float>(tolerance);
+  const Cell cell = cell_at(p);
   std::array<float, 512> scales;
   this->scales(cell.lower, cell.mask, scales);
   return static_cast<float>(tolerance * scales[cell.sample]);

@@ -25,7 +25,7 @@ namespace hermesh {
 inline constexpr double kSimplifiedTolerance = 8.0;
 
 /// An adaptivity field at single positions of index space, relative to the placement's base: a position has
-/// the values of the cell that contains it.
+/// the values of the cell that contains it, and is in the mask if a cell is that contains or touches it.
 class FieldAtPoints : public FieldEvaluator {
  public:
   /// @param field may be null
@@ -45,7 +45,7 @@ class FieldAtPoints : public FieldEvaluator {
  private:
   struct Cell;
   Cell cell_at(const Eigen::Vector3d& p) const;
-  bool in_mask(const Cell& cell) const;
+  bool in_mask(const Eigen::Vector3d& p) const;
 
   const std::array<std::int32_t, 3> base_;
 };

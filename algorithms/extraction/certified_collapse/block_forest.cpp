@@ -71,7 +71,11 @@ class BlockTrees {
     sum.first = p;
     sum.tolerance = in_.tolerance[p];
     sum.places = fine_.points()[p];
-    sum.quadric.add(quadric_at(fine_, p), sum.places - anchor_);
+    // In double precision: the vertices of a polyhedron's creases and corners must remain on its planes.
+    const Vector3d from_anchor = sum.places - anchor_;
+    for_each_plane_at(fine_, p, [&](const Vector3d& n, double weight) {
+      sum.quadric.add_plane(n, -n.dot(from_anchor), weight);
+    });
     for (int a = 0; a < 3; ++a) cells_[i][a] = static_cast<std::int32_t>(std::floor(sum.places[a]));
   }
 

@@ -30,13 +30,17 @@ CertifiedMesh decimate_certified(const FineMesh& fine, const std::vector<float>&
   timed("decimate", [&] { proof.sort_out(); });
   collapse({}, Collapses::bold);
   timed("decimate", [&] { proof.sort_out(); });
-  collapse({}, Collapses::careful);
+  const auto collapse_carefully = [&](std::span<const std::uint8_t> where) {
+    collapse(where, Collapses::careful);
+    timed("decimate", [&] { propose_members(forest, proof.merged(), input, context); });
+  };
+  collapse_carefully({});
   timed("certify", [&] { proof.prove(); });
   // Where the proof has split sets, further collapses are possible.
   for (int i = 0; i < kMostPasses; ++i) {
     const double before = double(proof.merged().leaders.size());
     const std::vector<std::uint8_t> brought_back(proof.brought_back().begin(), proof.brought_back().end());
-    collapse(brought_back, Collapses::careful);
+    collapse_carefully(brought_back);
     timed("certify", [&] { proof.prove(); });
     if (double(proof.merged().leaders.size()) > (1.0 - kWorthAnother) * before) break;
   }

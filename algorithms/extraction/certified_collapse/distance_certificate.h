@@ -18,7 +18,8 @@ inline constexpr double kDistanceSlack = 0.005;
 /// Proves that triangles are near a mesh, one after another.
 ///
 /// **Why it holds.** Most triangles are covered by the mesh directly above or below, no farther away than the
-/// bound (triangle_overlay.h). The others, at creases and boundaries, are cut into pieces until each is
+/// bound (triangle_overlay.h), except for a seam along its sides that is within half of kDistanceSlack of the
+/// rest. The others, at creases and boundaries, are cut into pieces until each is
 /// covered so, or until its corners are within the bound of one triangle of the mesh (the distance to a
 /// convex set is convex), or until its middle's distance and its radius add up to no more than the bound and
 /// kDistanceSlack. The proof may fail although the triangle is near: the nearest triangle of the mesh is
@@ -37,7 +38,7 @@ class DistanceCertificate {
   bool holds(const Corners& triangle, std::uint32_t start, const Bound& bound, Seen&& seen) {
     const Eigen::Vector3d middle = (triangle[0] + triangle[1] + triangle[2]) / 3.0;
     start = mesh_.walk(start, middle);
-    if (overlay_.is_near(triangle, mesh_, start, bound, seen)) return true;
+    if (overlay_.is_near(triangle, mesh_, start, bound, seen, 0.5 * kDistanceSlack)) return true;
     pieces_left_ = kMostPieces;
     return holds_in_pieces(triangle, start, bound, nullptr);
   }
@@ -67,7 +68,8 @@ class DistanceCertificate {
     for (const Eigen::Vector3d& p : piece) radius = std::max(radius, (p - middle).norm());
     if (distance + radius <= within + kDistanceSlack) return true;
     const Face face{TriangleReach(mesh_.corners(found)), within};
-    if (face.is_near(piece) || overlay_.is_near(piece, mesh_, found, bound)) return true;
+    if (face.is_near(piece) || overlay_.is_near(piece, mesh_, found, bound, 0.5 * kDistanceSlack))
+      return true;
 
     int i = 0;
     for (int side = 1; side < 3; ++side)

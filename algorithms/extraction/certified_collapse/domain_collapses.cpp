@@ -73,6 +73,12 @@ constexpr double kHopeless = 2.0;
 /// The same for an unverified collapse, which has no other distance test. (With 0.3 the proof undoes a third
 /// of the collapses, with 0.03 nearly all is left to verified collapses, which cost five times as much each.)
 constexpr double kBold = 0.12;
+/// Rounding of a quadric's sums in squares of distances, as a share of the squared distance between the ends
+/// of an edge, and a distance in voxels below which positions are as good as each other.
+constexpr double kRounding = 1e-7, kExact = 1e-4;
+/// Height of a triangle, in voxels, up to which rounding decides its normal. Where several blocks meet at the
+/// corner of a polyhedron, each of them makes a vertex there.
+constexpr double kFlat = 1e-5;
 
 /// Returns the shape of a triangle, 1 for equilateral and 0 for degenerate: its area over the sum of its
 /// squared sides, scaled.
@@ -168,6 +174,13 @@ class DomainCollapses {
     return sum;
   }
 
+  /// Returns true if not all planes of a quadric are nearly parallel.
+  static bool is_folded(const WideQuadric& q) {
+    constexpr double kLeastFold = 1e-5;  // product of two eigenvalues of `a`, of the square of their sum
+    const double sum = q.a.trace();
+    return sum * sum - q.a.squaredNorm() > 2.0 * kLeastFold * sum * sum;
+  }
+
   /// Returns the position and cost of the merged ends of an edge; an end that may not move stays.
   Target target(std::uint32_t u, std::uint32_t v) const {
     const DomainMesh::Vertex &at_u = at(u), &at_v = at(v);
@@ -181,6 +194,14 @@ class DomainCollapses {
     const double squared = (at_u.point - at_v.point).squaredNorm();
     // Nearly parallel planes meet far away: limited to the length of the edge.
     if (x.squaredNorm() > squared) x *= std::sqrt(squared) / x.norm();
+    if (at_u.free && at_v.free && is_folded(q)) {
+      // At a crease or corner the minimiser is off by the rounding of the sums and by its pull; an end that
+      // is on the planes is exact.
+      const Vector3d to_u = at_u.point - middle;
+      const double at_ends[2] = {q(to_u), q(-to_u)};
+      if (std::min(at_ends[0], at_ends[1]) <= q(x) + (kRounding * squared + kExact * kExact) * q.a.trace())
+        x = at_ends[0] <= at_ends[1] ? to_u : Vector3d(-to_u);
+    }
     const double tolerance = std::min(mesh_.least_tolerance[at_u.global], mesh_.least_tolerance[at_v.global]);
     const double off = q(x), now = moment > 0 ? cost(x) : off,
                  limit = kind_ == Collapses::bold ? kBold : kHopeless;
@@ -290,13 +311,25 @@ class DomainCollapses {
     return is;
   }
 
-  /// Returns true if a face keeps some area, does not turn over and is not a sliver.
+  /// Returns true if a triangle, of twice the area `size`, is no higher than kFlat.
+  static bool is_flat(double size, const Corners& c) {
+    const double longest =
+        std::max({(c[1] - c[0]).squaredNorm(), (c[2] - c[1]).squaredNorm(), (c[0] - c[2]).squaredNorm()});
+    return size * size <= kFlat * kFlat * longest;
+  }
+
+  /// Returns true if a face keeps some area, does not turn over and is not a sliver, or was one already whose
+  /// normal rounding decides.
   bool is_well_shaped(const Collapse::NewFace& made, const Corners& before) const {
-    const bool bold = kind_ == Collapses::bold;
+    const Vector3d own_normal = (before[1] - before[0]).cross(before[2] - before[0]);
+    const double size = made.normal.norm();
+    const bool was_flat = is_flat(own_normal.norm(), before);
+    if (was_flat && is_flat(size, made.at)) return true;
+    const bool by_fine = was_flat || kind_ == Collapses::bold;
     const Vector3d normal_before =
-        bold ? mesh_.input.fine.normal(mesh_.fine_triangle[local_.faces[made.face].global]).cast<double>()
-             : (before[1] - before[0]).cross(before[2] - before[0]);
-    const double size = made.normal.norm(), least = bold ? kLeastCosineToFine : kLeastCosineToOld;
+        by_fine ? mesh_.input.fine.normal(mesh_.fine_triangle[local_.faces[made.face].global]).cast<double>()
+                : own_normal;
+    const double least = by_fine ? kLeastCosineToFine : kLeastCosineToOld;
     constexpr double kDegenerate = 1e-9;  // of its squared sides
     if (size <=
         kDegenerate * ((made.at[1] - made.at[0]).squaredNorm() + (made.at[2] - made.at[0]).squaredNorm()))

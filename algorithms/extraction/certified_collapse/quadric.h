@@ -25,16 +25,23 @@ struct PlaneQuadric {
   }
 };
 
-/// Returns the quadric of the triangles around a vertex of a fine mesh, about that vertex; each triangle
+/// Calls f(unit normal, weight) for the planes of the triangles around a vertex of a fine mesh; each triangle
 /// gives a third of its area to each corner.
-inline PlaneQuadric quadric_at(const FineMesh& fine, std::uint32_t point) {
-  PlaneQuadric quadric;
+template <class F>
+void for_each_plane_at(const FineMesh& fine, std::uint32_t point, F&& f) {
   for (const std::uint32_t t : fine.around(point)) {
     const Corners at = fine.corners(t);
     const Eigen::Vector3d normal = (at[1] - at[0]).cross(at[2] - at[0]);
     const double size = normal.norm();
-    if (size > 0) quadric.add_plane(normal / size, size / 6.0);
+    if (size > 0) f(Eigen::Vector3d(normal / size), size / 6.0);
   }
+}
+
+/// Returns the quadric of these planes, about the vertex.
+inline PlaneQuadric quadric_at(const FineMesh& fine, std::uint32_t point) {
+  PlaneQuadric quadric;
+  for_each_plane_at(fine, point,
+                    [&](const Eigen::Vector3d& n, double weight) { quadric.add_plane(n, weight); });
   return quadric;
 }
 
@@ -76,7 +83,10 @@ struct WideQuadric {
   /// decides where planes do not.
   Eigen::Vector3d minimiser() const {
     const double weight = kPull * a.trace() + 1e-12;
-    return (a + weight * Eigen::Matrix3d::Identity()).ldlt().solve(-b);
+    const auto pulled = (a + weight * Eigen::Matrix3d::Identity()).ldlt();
+    const Eigen::Vector3d x = pulled.solve(-b);
+    // Once more from there: where the planes decide, little of the pull remains.
+    return x + pulled.solve(-b - a * x);
   }
 };
 

@@ -211,6 +211,22 @@ class Relaxation {
   int sweeps_ = 0;
 };
 
+/// Joins the set of a vertex of the merged mesh to one that has moved to `place`.
+void move(MergeForest& forest, std::uint32_t p, const Vector3d& place, const DecimationInput& input) {
+  const std::uint32_t set = forest.set_of(p);
+  const bool single = set == MergeForest::kNone;
+  const Vector3d last = single ? input.fine.points()[p] : forest.node(set).place;
+  if (place == last) return;
+  WideQuadric moved;
+  moved.add(single ? quadric_at(input.fine, p) : forest.node(set).quadric, last - place);
+  forest.join(
+      p,
+      {.first = p, .merges = true, .moves = true, .place = place, .quadric = moved.about(Vector3d::Zero())});
+}
+
+/// Largest distance of propose_members(), voxels.
+constexpr double kNearMember = 0.02;
+
 }  // namespace
 
 void propose_relaxation(MergeForest& forest, const MergedMesh& merged, const DecimationInput& input,
@@ -224,19 +240,28 @@ void propose_relaxation(MergeForest& forest, const MergedMesh& merged, const Dec
     for (std::uint32_t v = 0; v < merged.leaders.size(); ++v) {
       if (relaxation.is_pinned(v)) continue;
       const Vector3d& before = merged.mesh->points()[v];
-      const Vector3d place = input.file.rounded(before + part * (relaxation.places()[v] - before));
-      const std::uint32_t p = merged.leaders[v], set = forest.set_of(p);
-      const bool single = set == MergeForest::kNone;
-      const Vector3d last = single ? input.fine.points()[p] : forest.node(set).place;
-      if (place == last) continue;
-      WideQuadric moved;
-      moved.add(single ? quadric_at(input.fine, p) : forest.node(set).quadric, last - place);
-      forest.join(p, {.first = p,
-                      .merges = true,
-                      .moves = true,
-                      .place = place,
-                      .quadric = moved.about(Vector3d::Zero())});
+      move(forest, merged.leaders[v], input.file.rounded(before + part * (relaxation.places()[v] - before)),
+           input);
     }
+  forest.settle();
+}
+
+void propose_members(MergeForest& forest, const MergedMesh& merged, const DecimationInput& input,
+                     const RunContext& context) {
+  std::vector<std::uint32_t> nearest(merged.leaders.size(), FineMesh::kNone);
+  parallel_blocks(nearest.size(), context, [&](std::size_t v) {
+    const std::uint32_t leader = merged.leaders[v], set = forest.set_of(leader);
+    // Collapses may have merged it into another vertex since.
+    if (set == MergeForest::kNone || forest.leader(leader) != leader || input.pinned[leader]) return;
+    double squared = kNearMember * kNearMember;
+    for (const std::uint32_t p : forest.members(set)) {
+      const double here = (input.fine.points()[p] - forest.node(set).place).squaredNorm();
+      if (here < squared) squared = here, nearest[v] = p;
+    }
+  });
+  for (std::size_t v = 0; v < nearest.size(); ++v)
+    if (nearest[v] != FineMesh::kNone)
+      move(forest, merged.leaders[v], input.fine.points()[nearest[v]], input);
   forest.settle();
 }
 

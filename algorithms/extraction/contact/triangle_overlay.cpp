@@ -8,8 +8,6 @@ namespace {
 
 using Place = OverTriangle::Place;
 
-/// Parts narrower than this, in voxels, are ignored.
-constexpr double kNarrow = 1e-9;
 /// Least cosine of the angle between a triangle and a face that covers it.
 constexpr double kFacing = 0.05;
 
@@ -37,23 +35,24 @@ ClippedTriangle::ClippedTriangle(const std::array<Place, 3>& triangle) {
 }
 
 // The part of the segment within all three sides is an interval. A segment that runs along a side, or less
-// than kNarrow within it, may be ignored.
-bool passes_over(const Place& from, const Place& to) {
+// than the margin within it, may be ignored.
+bool passes_over(const Place& from, const Place& to, double margin) {
   double begin = 0, end = 1;
   for (int i = 0; i < 3; ++i) {
-    if (from[i] >= -kNarrow && to[i] >= -kNarrow) return false;
-    if (from[i] > 0) begin = std::max(begin, from[i] / (from[i] - to[i]));
-    if (to[i] > 0) end = std::min(end, from[i] / (from[i] - to[i]));
+    if (from[i] >= -margin && to[i] >= -margin) return false;
+    const double a = from[i] + margin, b = to[i] + margin;
+    if (a > 0) begin = std::max(begin, a / (a - b));
+    if (b > 0) end = std::min(end, a / (a - b));
   }
   return begin < end;
 }
 
-/// Returns true if the part over the triangle has some area, more than kNarrow from the sides. A part within
-/// that distance would have no side for which passes_over() holds, so the rest of the triangle would be
-/// considered covered. Seen along the triangle's normal, two of the distances beyond its sides are
+/// Returns true if the part over the triangle has some area, more than the margin from the sides. A part
+/// within that distance would have no side for which passes_over() holds, so the rest of the triangle would
+/// be considered covered. Seen along the triangle's normal, two of the distances beyond its sides are
 /// coordinates.
-bool TriangleOverlay::overlaps(std::array<Place, 3> places) {
-  for (Place& place : places) place.head<3>().array() += kNarrow;
+bool TriangleOverlay::overlaps(std::array<Place, 3> places, double margin) {
+  for (Place& place : places) place.head<3>().array() += margin;
   const ClippedTriangle part(places);
   double twice_area = 0;
   for (int i = 1; i + 1 < part.size; ++i) {

@@ -49,6 +49,24 @@ TEST(TriangleOverlay, FindsTheGreatestHeightWhereverItIs) {
   EXPECT_FALSE(is_near(beside, tent, 2 * (2 * 8 + 2), 0.499));
 }
 
+TEST(TriangleOverlay, SlackIgnoresASeamAlongTheSides) {
+  // The sheet turns down steeply at x = 4, a millionth before the triangle's side.
+  const FineMesh crease = sheet(8, [](int x, int) { return -100.0 * std::max(0, x - 4); });
+  const double side = 4.000001;
+  const Corners t = {Vector3d(1.5, 2, 0), Vector3d(side, 2, 0), Vector3d(side, 5, 0)};
+  const std::uint32_t start = 2 * (2 * 8 + 3);
+  const auto is_near_with = [&](const Corners& triangle, double slack) {
+    return TriangleOverlay(crease.triangles().size())
+        .is_near(
+            triangle, crease, start, [](std::uint32_t) { return 0.01; }, slack);
+  };
+  EXPECT_FALSE(is_near_with(t, 0.0));
+  EXPECT_TRUE(is_near_with(t, 0.0025));
+  // A seam as wide as the slack is not ignored.
+  const Corners wider = {t[0], Vector3d(4.0025, 2, 0), Vector3d(4.0025, 5, 0)};
+  EXPECT_FALSE(is_near_with(wider, 0.0025));
+}
+
 TEST(TriangleOverlay, SaysNoWhereTheMeshEndsOrFacesTheOtherWay) {
   const FineMesh flat = sheet(4, [](int, int) { return 0.0; });
   EXPECT_TRUE(

@@ -75,6 +75,20 @@ Eigen::Vector3d Qef::minimiser_near(const Eigen::Vector3d& start, double truncat
   return start + step;
 }
 
+Eigen::Vector3d Qef::line(double truncation) const {
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(ata_);
+  const Eigen::Vector3d& values = solver.eigenvalues();
+  const double least = truncation * truncation * values[2];
+  if (values[0] > least || !(values[1] > least)) return Eigen::Vector3d::Zero();
+  return solver.eigenvectors().col(0);
+}
+
+bool Qef::has_corner(const Eigen::Vector3d& free, double truncation) const {
+  if (turned() < kFeature || error(free) > kMeet * kMeet) return false;
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(ata_, Eigen::EigenvaluesOnly);
+  return solver.eigenvalues()[0] > truncation * truncation * solver.eigenvalues()[2];
+}
+
 Eigen::Vector3d Qef::minimiser_within(const Eigen::Vector3d& lower, const Eigen::Vector3d& upper,
                                       double truncation) const {
   const Eigen::Vector3d free = minimiser(truncation);

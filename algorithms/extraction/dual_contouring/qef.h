@@ -53,6 +53,12 @@ class Qef {
   /// parallel, 1 if truncation keeps more than one direction, and in between a smooth step by turned().
   double share_of_minimiser(double smooth, double truncation) const;
 
+  /// Returns the unit direction of the line of minima if truncation keeps exactly two directions, else zero.
+  Eigen::Vector3d line(double truncation) const;
+
+  /// Returns true if all planes meet at `free`, and truncation keeps all three directions.
+  bool has_corner(const Eigen::Vector3d& free, double truncation) const;
+
   double error(const Eigen::Vector3d& x) const;  ///< E(x), never negative
 
   /// Returns true if the planes of a feature meet at `free`, and not at `held`, so only `free` reproduces a

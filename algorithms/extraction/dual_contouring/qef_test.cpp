@@ -104,5 +104,20 @@ TEST(Qef, TheShareRisesFromSmoothSurfacesToFeatures) {
   EXPECT_EQ(edge.share_of_minimiser(smooth, 0.0), 1.0);
 }
 
+TEST(Qef, TellsCreasesFromCorners) {
+  Qef planes(Vector3d::Zero());
+  planes.add_plane(Vector3d(0, 0, 0.3), Vector3d::UnitZ());
+  EXPECT_TRUE(planes.line(0.1).isZero());
+  planes.add_plane(Vector3d(0.4, 0, 0), Vector3d::UnitX());
+  EXPECT_NEAR(std::abs(planes.line(0.1).y()), 1.0, 1e-12);
+  EXPECT_FALSE(planes.has_corner(planes.minimiser(0.1), 0.1));
+  planes.add_plane(Vector3d(0, 0.2, 0), Vector3d::UnitY());
+  EXPECT_TRUE(planes.line(0.1).isZero());
+  EXPECT_TRUE(planes.has_corner(planes.minimiser(0.1), 0.1));
+  // A fourth plane that misses the corner of the others by more than Qef::kMeet.
+  planes.add_plane(Vector3d(0.4, 0.2, 0.31), Vector3d(1, 1, 1).normalized());
+  EXPECT_FALSE(planes.has_corner(planes.minimiser(0.1), 0.1));
+}
+
 }  // namespace qef_test
 }  // namespace hermesh

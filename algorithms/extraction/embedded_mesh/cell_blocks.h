@@ -94,6 +94,7 @@ class CellBlocks {
   struct Edge {
     std::int32_t block;
     int sample, axis;
+    bool operator==(const Edge&) const = default;
   };
   struct Cell {
     std::int32_t block;
@@ -123,7 +124,7 @@ class CellBlocks {
   /// of a loop's crossings may be as close to a face as a third of the margin, and rounding also moves a
   /// crossing off its edge. The margin is therefore eight times the rounding at the lattice's farthest
   /// corner, and at least 1/1024: along axes of the world, eight times the rounding at 2048 voxels from the
-  /// meshes' origin (IndexToWorld::origin).
+  /// meshes' origin (IndexToWorld::origin). Only vertices with a target may be nearer (TetrahedronCorners).
   double margin() const { return margin_; }
   /// Returns the largest rounding error of a vertex in the file along each axis of the lattice, in voxels.
   const Eigen::Vector3d& rounding() const { return rounding_; }

@@ -33,9 +33,14 @@ void PlainPoints::read(const CellBlocks& cells, std::int32_t block) {
   }
 }
 
-EdgePolygons::EdgePolygons(const CellBlocks& cells, const UniformPoints& points, const EdgeMasks* only,
-                           RunContext& context)
-    : cells_(cells), only_(only), edges_(cells.size()), held_(cells.size()), centred_(cells.size()) {
+EdgePolygons::EdgePolygons(const CellBlocks& cells, const TetrahedronCorners& corners,
+                           const UniformPoints& points, const EdgeMasks* only, RunContext& context)
+    : cells_(cells),
+      corners_(corners),
+      only_(only),
+      edges_(cells.size()),
+      held_(cells.size()),
+      centred_(cells.size()) {
   parallel_blocks(cells_.size(), context, [&](std::size_t b) {
     const auto block = static_cast<std::int32_t>(b);
     if (only_ && !only_->has(b)) return;
@@ -145,12 +150,16 @@ void EdgePolygons::decide(const CellBlocks::Edge& edge, double hit, const Unifor
   }
   EnvelopeCut cut;
   if (!any_explicit) {
-    const Vector3d start = cells_.corner(edge.block, edge.sample);
+    const auto [start, along] = corners_.ends(edge);
+    const int axis = edge.axis, u = (axis + 1) % 3, v = (axis + 2) % 3;
+    // A shear makes the edge parallel to its axis, and preserves tetrahedra.
     std::array<EnvelopeCorner, 4> r;
     for (int i = 0; i < 4; ++i) {
       const Vector3d p = points[corners[i]] - start;
-      r[i] = {p[(edge.axis + 1) % 3], p[(edge.axis + 2) % 3], p[edge.axis]};
+      const double h = p[axis] / along[axis];
+      r[i] = {p[u] - h * along[u], p[v] - h * along[v], h};
     }
+    hit = (cells_.corner(edge.block, edge.sample)[axis] + hit - start[axis]) / along[axis];
     cut = cut_quad(r, hit);
   }
   // Both bits are written, so that the result does not depend on earlier decisions.

@@ -9,6 +9,7 @@
 
 #include "algorithms/core/polygon_mesh.h"
 #include "algorithms/extraction/embedded_mesh/cell_blocks.h"
+#include "algorithms/extraction/embedded_mesh/tetrahedron_corners.h"
 #include "algorithms/extraction/embedded_mesh/uniform_points.h"
 
 namespace hermesh {
@@ -48,13 +49,16 @@ class PlainPoints {
 class EdgePolygons {
  public:
   /// Decides the form of each edge by the positions of the cells' vertices. No cell is held yet.
-  /// @param cells must outlive this
+  /// @param cells must outlive this, as must `corners`
+  /// @param corners of the tetrahedra
   /// @param points positions of the cells' vertices
   /// @param only the crossed edges that get polygons, all if null; must outlive this
   /// @param context receives the progress and the request to cancel
   /// @throws Error for more than 2³² vertices or polygons; Cancelled
-  EdgePolygons(const CellBlocks& cells, const UniformPoints& points, const EdgeMasks* only,
-               RunContext& context);
+  EdgePolygons(const CellBlocks& cells, const TetrahedronCorners& corners, const UniformPoints& points,
+               const EdgeMasks* only, RunContext& context);
+
+  const TetrahedronCorners& corners() const { return corners_; }
 
   const BlockMask& edges(std::int32_t block, int axis) const {
     return only_ ? (*only_)[block][axis] : cells_.source(block).crossing[axis];
@@ -81,6 +85,12 @@ class EdgePolygons {
   /// Returns the position of a crossing before rounding: the middle of its edge if any of the four cells is
   /// centred.
   Eigen::Vector3d crossing_position(const CellBlocks::Edge& edge) const;
+
+  /// Cuts the quad of an edge along its other diagonal.
+  void turn_quad(const CellBlocks::Edge& edge) {
+    BlockMask& second = edges_.at(edge.block).second_diagonal[edge.axis];
+    set_bit(second, edge.sample, !test(second, edge.sample));
+  }
 
   std::uint64_t point_count() const { return points_; }  ///< vertices of cells and of fanned edges
   std::uint64_t fanned_edges() const { return fanned_edges_; }
@@ -147,6 +157,7 @@ class EdgePolygons {
               const PlainPoints* near = nullptr);
 
   const CellBlocks& cells_;
+  const TetrahedronCorners& corners_;
   const EdgeMasks* const only_;
   ByBlock<BlockEdges> edges_;
   ByBlock<BlockMask> held_, centred_;  ///< cells; not in `edges_`, as they are read across blocks meanwhile

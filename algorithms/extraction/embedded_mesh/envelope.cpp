@@ -11,7 +11,7 @@ using Corner = EnvelopeCorner;
 /// Least area, with terms of the order of one, that is certainly positive: far above rounding.
 constexpr double kLeastTurn = 1e-5;
 /// Distance of heights from the ends of the edge, in lengths of the edge.
-constexpr double kMargin = 1e-4;
+constexpr double kMargin = 1e-6;
 
 double cross(const Corner& a, const Corner& b) { return a.u * b.v - a.v * b.u; }
 

@@ -8,6 +8,7 @@
 
 #include "algorithms/extraction/embedded_mesh/edge_polygons.h"
 #include "algorithms/extraction/embedded_mesh/file_points.h"
+#include "algorithms/extraction/embedded_mesh/point_target.h"
 #include "algorithms/extraction/embedded_mesh/uniform_points.h"
 
 namespace hermesh {
@@ -43,13 +44,6 @@ std::vector<CellBlocks::Cell> hold_cells_that_meet(const CellBlocks& cells, Edge
                                                    const FilePoints& file, UniformPoints& points,
                                                    double farthest, RunContext& context);
 
-/// The preferred position, outside the cell, of the vertex of a cell of one sheet or of a joint.
-struct PointTarget {
-  int cell;
-  Eigen::Vector3d place;
-  Eigen::Vector3d nearer;  ///< as near to the planes, but nearer to the vertex's position within the cell
-};
-
 /// Moves vertices to their targets, or part of the way. The rule of tetrahedra (uniform_mesh.h) is sufficient
 /// for an embedded mesh, but not necessary: here a vertex moves if its polygons would intersect neither each
 /// other nor any polygon nearby (triangle_contact.h), so an embedded mesh remains embedded. `targets` are by
@@ -64,8 +58,10 @@ struct PointTarget {
 /// component is 1 on one side of q and 0 on the other; afterwards both differ by k. As the mesh is embedded
 /// after the move, too, its orientation is unchanged if and only if k is 0. A vertex moves only if k is 0 for
 /// each piece whose boundary it is on.
+/// @param polygons quads with a triangle that a move would leave without area are cut along the other
+/// diagonal
 /// @throws Cancelled
-void move_points(const CellBlocks& cells, const EdgePolygons& polygons,
+void move_points(const CellBlocks& cells, EdgePolygons& polygons,
                  const std::vector<std::vector<PointTarget>>& targets, const FilePoints& file,
                  UniformPoints& points, RunContext& context);
 

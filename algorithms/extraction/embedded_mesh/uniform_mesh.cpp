@@ -24,6 +24,12 @@ constexpr double kWorthLeavingCell = 0.03;
 /// Deviation from the planes up to which a position within the cell is accepted, in voxels, root mean square.
 constexpr double kGoodEnough = 0.005;
 
+/// Largest distance beyond a corner of a vertex that misses its third plane, voxels.
+constexpr double kLongestSpur = 1.0;
+
+/// Least cosine of the angle between the directions of one crease in two cells.
+constexpr double kSameLine = 0.9999;
+
 /// Least determinant, with terms of the order of one, that is certainly positive: far above rounding.
 constexpr double kLeastVolume = 1e-5;
 
@@ -37,8 +43,10 @@ double volume(const Vector3d& a, const Vector3d& b, const Vector3d& c, const Vec
 class CellRecords {
  public:
   /// Reads the crossings of a block and of the lower layers of the blocks above. Returns false if a normal is
-  /// not of unit length, as in data without normals.
-  bool read(const CellBlocks& cells, std::int32_t block) {
+  /// not of unit length, as in data without normals. `near_ends` receives the block's cells with a crossing
+  /// nearer to an end of its edge than margin(), except for cells that are active because of other blocks.
+  bool read(const CellBlocks& cells, std::int32_t block, BlockMask& near_ends) {
+    near_ends = {};
     // The array is large and mostly empty: only entries of the previous block are cleared.
     for (const int number : written_) std::fill_n(records_[number].data(), 4, 0.0f);
     written_.clear();
@@ -64,6 +72,8 @@ class CellRecords {
             const int number = leaf_kernels::RecordCube::number(axis, x + 8 * d[0], (bit >> 3) + 8 * d[1],
                                                                 (bit & 7) + 8 * d[2]);
             written_.push_back(number);
+            if (std::abs(crossing.offset - 0.5f) > 0.5 - cells.margin())
+              mark_cells(axis, x + 8 * d[0], (bit >> 3) + 8 * d[1], (bit & 7) + 8 * d[2], near_ends);
             records_[number] = {
                 static_cast<float>(std::clamp(double(crossing.offset), cells.margin(), 1.0 - cells.margin())),
                 n[axis], n[(axis + 1) % 3], n[(axis + 2) % 3]};
@@ -76,6 +86,16 @@ class CellRecords {
   const float (*data() const)[4] { return reinterpret_cast<const float(*)[4]>(records_.data()); }
 
  private:
+  /// Marks those of the four cells around an edge that are in the block.
+  static void mark_cells(int axis, int x, int y, int z, BlockMask& cells) {
+    for (const auto& [u, v] : kAroundEdge) {
+      int at[3] = {x, y, z};
+      at[(axis + 1) % 3] += u;
+      at[(axis + 2) % 3] += v;
+      if (((at[0] | at[1] | at[2]) & ~7) == 0) set_bit(cells, sample_index(at[0], at[1], at[2]));
+    }
+  }
+
   std::vector<std::array<float, 4>> records_ =
       std::vector<std::array<float, 4>>(leaf_kernels::RecordCube::kAll);
   std::vector<int> written_;
@@ -93,6 +113,8 @@ class UniformContourer {
         reach_(std::min(options.reach, kFarthestFromCell)),
         file_(file),
         targets_(cells_.size()),
+        corners_of_planes_(cells_.size()),
+        corners_(cells_),
         points_(UniformPoints::of_few(cells_.point_count())) {
     counts_.cells = cells_.cell_count();
     if (grid.cuts().empty()) return;  // no joints
@@ -108,12 +130,12 @@ class UniformContourer {
     // made. Late moves change positions only.
     place_all_points(context);
     let_points_leave(context);
-    const EdgePolygons polygons = connect(nullptr, context);
+    EdgePolygons polygons = connect(nullptr, context);
     UniformMesh mesh;
-    fill(polygons, mesh, context);
     move_points(cells_, polygons, targets_, file_, points_, context);
+    fill(polygons, mesh, context);
     // Only vertices with a target can have left their cells.
-    for_each_with_target([&](double outside) { counts_.escaped += outside > 0; });
+    for_each_with_target([&](double outside) { counts_.escaped += outside > cells_.rounding().maxCoeff(); });
     mesh.points = points_.take();
     mesh.counts = std::move(counts_);
     return mesh;
@@ -142,7 +164,7 @@ class UniformContourer {
   EdgePolygons connect(const EdgeMasks* edges, RunContext& context) {
     EdgePolygons polygons = [&] {
       Stage stage(context, "connect");
-      return EdgePolygons(cells_, points_, edges, context);
+      return EdgePolygons(cells_, corners_, points_, edges, context);
     }();
     // A later call adds edges of the same cells; holding others than before would change existing polygons.
     if (held_) {
@@ -194,7 +216,8 @@ class UniformContourer {
     const bool average = options_.placement == DualContouringOptions::Placement::average;
     if (!average && options_.truncation < leaf_kernels::kLeastTruncation) return placed;
     thread_local CellRecords records;
-    if (!records.read(cells_, block)) return placed;
+    BlockMask near_ends;
+    if (!records.read(cells_, block, near_ends)) return placed;
     constexpr std::size_t kMost = 512 + leaf_kernels::kLargestVector;
     std::array<std::uint16_t, kMost> cell{};
     std::array<std::array<float, kMost>, 3> place;
@@ -202,7 +225,8 @@ class UniformContourer {
     std::array<std::uint32_t, kMost> point;
     std::size_t found = 0;
     for_each_bit(wanted, [&](int at) {
-      if (!cells_.is_plain(block, at)) return;
+      // Planes through a crossing near an end of its edge are those of single cells, which may get a target.
+      if (!cells_.is_plain(block, at) || (has_exact_planes() && test(near_ends, at))) return;
       point[found] = cells_.point(block, at, 0);
       cell[found++] = static_cast<std::uint16_t>(at);
     });
@@ -238,12 +262,19 @@ class UniformContourer {
   /// sheets it is the mean of the loop's crossings: in their hull, which is disjoint from those of other
   /// loops (cell_sheets.h).
   Vector3d place(std::int32_t block, int cell, int sheet, int sheets) {
+    Vector3d sum = Vector3d::Zero();
+    const Qef qef = planes_of(block, cell, sheet, sheets, sum);
+    if (sheets > 1) return sum / qef.planes();
+    if (options_.placement == DualContouringOptions::Placement::average)
+      return cells_.is_plain(block, cell) ? qef.mass_point() : Vector3d(sum / qef.planes());
+    return best_place(block, cell, qef, cells_.corner(block, cell));
+  }
+
+  /// Returns the planes at the crossings of a sheet, and adds the positions of these, held within margin().
+  Qef planes_of(std::int32_t block, int cell, int sheet, int sheets, Vector3d& sum) const {
     const bool plain = cells_.is_plain(block, cell);
     const CellSheets& loops = cells_.sheets(block, cell);
-    const Vector3d corner = cells_.corner(block, cell);
-    Qef qef(corner + Vector3d::Constant(0.5));
-    Vector3d sum = Vector3d::Zero();
-    int crossings = 0;
+    Qef qef(cells_.corner(block, cell) + Vector3d::Constant(0.5));
     // A joint of one vertex has all crossed edges of its cell, including cuts, which sheet_of ignores.
     for (unsigned edges = plain ? kCrossedEdges[cells_.corner_code(cells_.cell_number(block, cell))] : 0xfffu;
          edges != 0; edges &= edges - 1) {
@@ -252,34 +283,53 @@ class UniformContourer {
       const CellBlocks::Edge at = cells_.edge_of_cell(block, cell, edge);
       if (sheets == 1 && !plain && !cells_.is_crossed(at)) continue;
       const EdgeCrossing crossing = cells_.grid().crossing(at.block, at.sample, at.axis);
-      const Vector3d point = cells_.crossing_point(at, crossing);
+      const Vector3d held = cells_.crossing_point(at, crossing);
+      Vector3d point = held;
+      if (has_exact_planes()) point[at.axis] = cells_.corner(at.block, at.sample)[at.axis] + crossing.offset;
       const auto& n = crossing.normal;
       qef.add_plane(point, Vector3d(n[0], n[1], n[2]));
-      sum += point;
-      ++crossings;
+      sum += held;
     }
-    if (sheets > 1) return sum / crossings;
-    if (options_.placement == DualContouringOptions::Placement::average)
-      return plain ? qef.mass_point() : Vector3d(sum / crossings);
-    return best_place(block, cell, qef, corner);
+    return qef;
+  }
+
+  /// Returns true if a position is so near to another one that only the distance from a face of the cell
+  /// parts them.
+  bool is_at(const Vector3d& p, const Vector3d& q) const {
+    return (p - q).cwiseAbs().maxCoeff() <= 2.0 * cells_.margin();
+  }
+
+  /// Returns true if the planes of the QEF are those of the data, even where a crossing is nearer to an end
+  /// of its edge than margin(). Vertices on the faces of their cells, where this matters, then become
+  /// targets.
+  bool has_exact_planes() const {
+    return reach_ > 0 && options_.placement != DualContouringOptions::Placement::average;
   }
 
   /// Returns the position within the cell, margin() off its faces, with the least error, drawn back on smooth
-  /// surfaces. If even that is far from the planes, as near a sharp feature that passes outside, or if these
-  /// intersect elsewhere, the unconstrained minimiser is recorded as a target.
+  /// surfaces. A better one nearer to a face is recorded as a target. If the position is far from the planes,
+  /// as near a sharp feature that passes outside, or if these intersect elsewhere, the unconstrained
+  /// minimiser is recorded instead.
   Vector3d best_place(std::int32_t block, int cell, const Qef& qef, const Vector3d& corner) {
     const Vector3d margin = Vector3d::Constant(cells_.margin());
     const Vector3d lower = corner + margin, upper = corner + Vector3d::Ones() - margin;
-    const Vector3d free = qef.minimiser(options_.truncation),
-                   mass = qef.mass_point().cwiseMax(lower).cwiseMin(upper);
+    const Vector3d free = qef.minimiser(options_.truncation), middle = qef.mass_point(),
+                   mass = middle.cwiseMax(lower).cwiseMin(upper);
     const double share = qef.share_of_minimiser(options_.smooth_share(), options_.truncation);
     // Clamping the minimiser is cheap and usually sufficient, unlike the search over faces, edges and
     // corners.
     const Vector3d nearest = free.cwiseMax(lower).cwiseMin(upper);
     // Planes from a level set never intersect exactly in one point, and nearly do so only by chance.
     const bool meet = reach_ > 0 && !options_.linear_crossings && qef.planes_meet(free, nearest);
-    if (!meet && qef.error(nearest) <= kGoodEnough * kGoodEnough * qef.planes())
-      return mass + share * (nearest - mass);
+    if (reach_ > 0 && !options_.linear_crossings && cells_.is_plain(block, cell) &&
+        qef.has_corner(free, options_.truncation))
+      corners_of_planes_[block].push_back(cell);
+    if (!meet && qef.error(nearest) <= kGoodEnough * kGoodEnough * qef.planes()) {
+      const Vector3d place = mass + share * (nearest - mass), best = middle + share * (free - middle);
+      if (has_exact_planes() && best != place && is_at(best, place))
+        targets_[block].push_back({cell, best, best});
+      return place;
+    }
     const Vector3d held = qef.minimiser_within(lower, upper, options_.truncation);
     if (reach_ > 0 && (qef.error(held) > kWorthLeavingCell * kWorthLeavingCell * qef.planes() ||
                        (meet && qef.planes_meet(free, held)))) {
@@ -294,10 +344,78 @@ class UniformContourer {
     return mass + share * (held - mass);
   }
 
+  /// Turns back vertices on creases that lie beyond the corner where the crease ends: a cell next to that of
+  /// the corner may not contain the third plane, so nothing else ends its line.
+  void turn_spurs(RunContext& context) {
+    std::vector<std::vector<std::pair<CellBlocks::Cell, PointTarget>>> turned(targets_.size());
+    parallel_blocks(targets_.size(), context, [&](std::size_t b) {
+      for (const int cell : corners_of_planes_[b])
+        turn_spurs_at({static_cast<std::int32_t>(b), cell}, turned[b]);
+    });
+    for (const auto& list : turned)
+      for (const auto& [cell, target] : list) {
+        std::vector<PointTarget>& targets = targets_[cell.block];
+        const auto at = std::ranges::lower_bound(targets, cell.cell, {}, &PointTarget::cell);
+        if (at != targets.end() && at->cell == cell.cell)
+          *at = target;
+        else
+          targets.insert(at, target);
+      }
+  }
+
+  /// Adds targets for the vertices beyond a corner: those near it on a line through it that goes on for
+  /// longer on the other side only.
+  void turn_spurs_at(const CellBlocks::Cell& corner,
+                     std::vector<std::pair<CellBlocks::Cell, PointTarget>>& turned) const {
+    struct OnLine {
+      CellBlocks::Cell cell;
+      Vector3d along;  ///< direction of the crease
+      double at;       ///< position from the corner
+    };
+    std::vector<OnLine> found;
+    const Vector3d end = preferred_place(corner);
+    cells_.for_each_about(corner, 2, [&](const CellBlocks::Cell& cell) {
+      if (cell == corner || !cells_.is_plain(cell.block, cell.cell)) return;
+      const Vector3d from_end = preferred_place(cell) - end;
+      Vector3d ignored = Vector3d::Zero();
+      const Vector3d along = planes_of(cell.block, cell.cell, 0, 1, ignored).line(options_.truncation);
+      const double at = along.dot(from_end);
+      if (!along.isZero() && (from_end - at * along).squaredNorm() < Qef::kMeet * Qef::kMeet)
+        found.push_back({cell, along, at});
+    });
+    for (const OnLine& one : found) {
+      double before = 0, beyond = 0, next = 1e30;  // farthest on either side, and nearest on the other side
+      for (const OnLine& other : found) {
+        const double turn = one.along.dot(other.along);
+        if (std::abs(turn) < kSameLine) continue;
+        const double at = std::copysign(other.at, other.at * turn * one.at);  // negative: on the other side
+        if (at > 0) beyond = std::max(beyond, at);
+        if (at < 0) before = std::max(before, -at), next = std::min(next, -at);
+      }
+      // Other lines, as a convex crease that becomes a concave one, go on.
+      if (beyond > kLongestSpur || before < 1.5 * kLongestSpur) continue;
+      // Distinct for distinct positions beyond the corner.
+      const double back = std::min(next, 1.0) * std::abs(one.at) / (1.0 + std::abs(one.at));
+      const Vector3d place = end - std::copysign(back, one.at) * one.along;
+      turned.emplace_back(one.cell, PointTarget{one.cell.cell, place, place});
+    }
+  }
+
+  /// Returns the target of a cell of one sheet, or the position of its vertex if it has none.
+  Vector3d preferred_place(const CellBlocks::Cell& cell) const {
+    const std::vector<PointTarget>& list = targets_[cell.block];
+    const auto target = std::ranges::lower_bound(list, cell.cell, {}, &PointTarget::cell);
+    return target != list.end() && target->cell == cell.cell
+               ? target->place
+               : points_[cells_.point(cell.block, cell.cell, 0)];
+  }
+
   /// Lets vertices leave their cells by the rule of tetrahedra. Cells of one parity share no face, so their
   /// vertices move independently: eight rounds, each with a result that does not depend on the order.
   void let_points_leave(RunContext& context) {
     Stage stage(context, "let points leave");
+    turn_spurs(context);
+    corners_.move(targets_);
     for (int parity = 0; parity < 8; ++parity)
       parallel_blocks(cells_.size(), context, [&](std::size_t b) {
         for (const PointTarget& target : targets_[b]) {
@@ -326,7 +444,12 @@ class UniformContourer {
   void leave(std::int32_t block, const PointTarget& target) {
     if (cells_.has_explicit_face(block, target.cell)) return;
     Vector3d& point = points_[cells_.point(block, target.cell, 0)];
-    const Vector3d corner = cells_.corner(block, target.cell);
+    const int x = target.cell >> 6, y = (target.cell >> 3) & 7, z = target.cell & 7;
+    std::array<Vector3d, 8> corners;
+    for (int c = 0; c < 8; ++c) {
+      const std::array<int, 3> d = corner_offset(c);
+      corners[c] = corners_.at(block, x + d[0], y + d[1], z + d[2]);
+    }
     std::array<Vector3d, 6> beside;
     for (int face = 0; face < 6; ++face) {
       const std::optional<Vector3d> there = point_beside(block, target.cell, face);
@@ -336,13 +459,17 @@ class UniformContourer {
     unsigned crossed = 0;  // a bit an edge
     for (int edge = 0; edge < 12; ++edge)
       crossed |= unsigned(cells_.is_crossed(cells_.edge_of_cell(block, target.cell, edge))) << edge;
-    for (const double share : {1.0, 0.75, 0.5, 0.25}) {
-      // Fractions of the distance, because the target may be just out of reach.
-      const Vector3d candidate = file_.rounded(point + share * (target.place - point));
-      if (!tetrahedra_are_positive(corner, candidate, beside, crossed, cells_.rounding())) continue;
+    const auto moves_to = [&](const Vector3d& place) {
+      const Vector3d candidate = file_.rounded(place);
+      if (!tetrahedra_are_positive(corners, candidate, beside, crossed, cells_.rounding())) return false;
       point = candidate;
-      return;
-    }
+      return true;
+    };
+    if (moves_to(target.place)) return;
+    if (is_at(target.place, point)) return;  // a part of the margin is no gain
+    // Fractions of the distance, because the target may be just out of reach.
+    for (const double share : {0.75, 0.5, 0.25})
+      if (moves_to(point + share * (target.place - point))) return;
   }
 
   /// Returns the vertex of the cell beyond a face, the centre of an inactive one (which no polygon uses, but
@@ -364,23 +491,19 @@ class UniformContourer {
   /// Returns true if all tetrahedra of a lattice edge of the cell, its vertex and that of an adjacent cell
   /// are positively oriented, and those of crossed edges remain so if divided by a point up to `aside` from
   /// the middle of the edge.
-  static bool tetrahedra_are_positive(const Vector3d& corner, const Vector3d& point,
+  static bool tetrahedra_are_positive(const std::array<Vector3d, 8>& at, const Vector3d& point,
                                       const std::array<Vector3d, 6>& beside, unsigned crossed,
                                       const Vector3d& aside) {
     for (int face = 0; face < 6; ++face) {
       const std::array<int, 4> corners = face_corners(face), edges = face_edges(face);
       for (int i = 0; i < 4; ++i) {
-        const auto at = [&](int c) {
-          const std::array<int, 3> offset = corner_offset(c);
-          return Vector3d(corner + Vector3d(offset[0], offset[1], offset[2]));
-        };
         // Corners run counter-clockwise for a viewer whom the face's axis points at.
-        const double v = volume(at(corners[i]), at(corners[(i + 1) % 4]), point, beside[face]);
+        const double v = volume(at[corners[i]], at[corners[(i + 1) % 4]], point, beside[face]);
         if ((face & 1 ? v : -v) < kLeastVolume) return false;
         // Either part has half of the volume, of which the offset leaves at least a tenth (fan_point()).
         if (!(crossed >> edges[i] & 1)) continue;
         for (const int end : {i, (i + 1) % 4}) {
-          const Vector3d to_point = point - at(corners[end]), to_beside = beside[face] - at(corners[end]);
+          const Vector3d to_point = point - at[corners[end]], to_beside = beside[face] - at[corners[end]];
           if (std::abs(v) < 2.5 * aside.dot(to_point.cross(to_beside).cwiseAbs())) return false;
         }
       }
@@ -431,7 +554,9 @@ class UniformContourer {
   const double reach_;  ///< largest distance of vertices from their cells, voxels
   const FilePoints& file_;
   const leaf_kernels::Kernels& kernels_ = chosen_kernels<leaf_kernels::Kernels>();
-  std::vector<std::vector<PointTarget>> targets_;  ///< one list per block, ascending by cell
+  std::vector<std::vector<PointTarget>> targets_;    ///< one list per block, ascending by cell
+  std::vector<std::vector<int>> corners_of_planes_;  ///< cells whose planes meet in one point, by block
+  TetrahedronCorners corners_;
   UniformPoints points_;
   UniformCounts counts_;
   /// The cells held, as found by the first connect(): the edges that they depend on are part of every

@@ -51,6 +51,11 @@
 //                  point at least 7/8 of the margin off the face on either side: rounding changes six times
 //                  their volume by at most 4/7 of it. The hulls of two loops are half a voxel apart.
 //
+// **Vertices on the faces of their cells**, as those of a polyhedron with faces in planes of the lattice,
+// have targets nearer to these than the margin. They are placed at the margin first, and reach their targets
+// by the rule for vertices that leave their cells. Its tetrahedra would have no volume with corners at
+// lattice points, so the corners are moved a little (tetrahedron_corners.h).
+//
 // Vertices that the tetrahedra confine to their cells, but whose targets are outside, are moved afterwards,
 // one by one, if a test of the current mesh finds no intersection (move_points() in tested_polygons.h).
 //
