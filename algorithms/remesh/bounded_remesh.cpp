@@ -2,9 +2,11 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <functional>
 #include <limits>
+#include <map>
 #include <memory>
 #include <numeric>
 #include <optional>
@@ -56,6 +58,10 @@ constexpr double kBytesOfPoint = 400.0;
 /// Number of times that tolerances are lowered before voxels are made smaller, and their factor.
 constexpr int kLowerings = 3;
 constexpr float kLowering = 0.4f;
+/// Share of the excepted area from which on smaller voxels are not worth another attempt; and, in errors, the
+/// radius of the balls around exceptions, except for single larger pieces, and the distance from them within
+/// which collapses may cause others.
+constexpr double kWorthFiner = 0.75, kBall = 4.0, kAroundBall = 0.5;
 
 /// A mesh to collapse, first the uniform one at a voxel size, and the surface that it approximates.
 struct Attempt {
@@ -76,6 +82,50 @@ struct Attempt {
   }
 };
 
+/// Balls that contain far pieces.
+class Balls {
+ public:
+  /// Makes balls that contain all pieces, each around the farthest piece that no earlier one contains.
+  Balls(std::vector<Far> pieces, double error) : error_(error) {
+    std::ranges::stable_sort(pieces, std::greater<>(), &Far::distance);
+    for (const Far& piece : pieces) {
+      UnmetPlace* ball = find(piece, [&](const UnmetPlace&) { return kBall * error_; });
+      if (!ball) {
+        cells_[cell_of(piece, 13)].push_back(balls_.size());
+        ball = &balls_.emplace_back(Unmet::thin, piece.place, piece.distance);
+      }
+      ball->radius = std::max(ball->radius, (piece.place - ball->place).norm() + piece.radius);
+      ball->area += piece.area;
+    }
+  }
+
+  /// Returns true if a ball contains a piece or nearly so.
+  bool nearly_contain(const Far& piece) {
+    return find(piece, [&](const UnmetPlace& ball) { return ball.radius + kAroundBall * error_; });
+  }
+  std::vector<UnmetPlace> list() && { return std::move(balls_); }
+
+ private:
+  /// Returns a ball that contains a piece if it has the radius `radius(ball)`; null if there is none.
+  template <class F>
+  UnmetPlace* find(const Far& piece, const F& radius) {
+    for (int n = 0; n < 27; ++n)
+      if (const auto found = cells_.find(cell_of(piece, n)); found != cells_.end())
+        for (const std::size_t i : found->second)
+          if ((piece.place - balls_[i].place).norm() + piece.radius <= radius(balls_[i])) return &balls_[i];
+    return nullptr;
+  }
+  /// Returns one of the 27 cells around a piece, the middle one for 13.
+  std::array<int, 3> cell_of(const Far& piece, int n) const {
+    const Eigen::Vector3d at = (piece.place / ((kBall + kAroundBall) * error_)).array().floor();
+    return {int(at.x()) + n / 9 - 1, int(at.y()) + n / 3 % 3 - 1, int(at.z()) + n % 3 - 1};
+  }
+
+  double error_;
+  std::vector<UnmetPlace> balls_;
+  std::map<std::array<int, 3>, std::vector<std::size_t>> cells_;  ///< numbers of balls by their centres' cell
+};
+
 class BoundedRemesher {
  public:
   BoundedRemesher(const PolygonMesh& mesh, const BoundedRemeshOptions& options, RunContext& context)
@@ -94,10 +144,39 @@ class BoundedRemesher {
     result_.over_holes = options_.over_holes;
     result_.voxel_size =
         std::min(std::max(kFirstVoxel * options_.error, smallest_voxel()), longest_ / kFewestVoxels);
-    if (try_larger(result_.voxel_size)) return std::move(result_);
+    if (try_larger(result_.voxel_size)) return finished();
     while (!try_at(result_.voxel_size) && result_.unmet.empty()) ++result_.rounds;
     if (!result_.unmet.empty()) result_.mesh = {};
-    return std::move(result_);
+    return finished();
+  }
+
+  /// Returns the mesh of a bound with exceptions, after run() has returned `refused`; that if there is none.
+  BoundedMesh run_with_exceptions(BoundedMesh refused) {
+    const std::size_t notes = context_.notes.size();
+    result_ = refused;
+    result_.unmet.clear();
+    double before = std::numeric_limits<double>::infinity();
+    for (double voxel_size = tried_;; voxel_size = std::max(kFinerBetween * voxel_size, smallest_voxel())) {
+      context_.notes.resize(notes);
+      const std::optional<Attempt> made = attempt(voxel_size);
+      const bool is_last = voxel_size <= smallest_voxel();
+      if (!made && is_last) return refused;
+      if (!made) continue;
+      const SurfaceDistance surface(made->surface->points, made->surface->triangles);
+      const SurfaceDistance uniform(made->file_points, made->fine.triangles());
+      const std::vector<Far> far = compare(*made, surface, uniform, Wanted::far_pieces).far;
+      const double excepted = std::transform_reduce(far.begin(), far.end(), 0.0, std::plus<>(),
+                                                    [](const Far& piece) { return piece.area; });
+      if (!is_last && excepted > 0.0 && excepted < kWorthFiner * std::exchange(before, excepted)) continue;
+      result_.voxel_size = voxel_size;
+      note_surface(*made);
+      excepted_.emplace(far, options_.error);
+      std::vector<double> apart = apart_at_points(*made, surface, 1);
+      far_points(*made, uniform, apart);
+      collapse_all(*made, surface, apart);
+      name_exceptions(*made);
+      return finished();
+    }
   }
 
  private:
@@ -200,10 +279,29 @@ class BoundedRemesher {
   void note_surface(const Attempt& now) {
     result_.hole_area = now.surface->cap_area;
     result_.left_out_area = std::max(0.0, area_ - now.surface->area);
+    surface_ = now.surface;
+  }
+
+  BoundedMesh finished() {
+    result_.area = area_;
+    if (result_.unmet.empty()) result_.topology = topology_of(surface_->points, surface_->triangles);
+    return std::move(result_);
+  }
+
+  /// Completes the exceptions of the result, which have positions relative to the polygons' origin.
+  void name_exceptions(const Attempt& now) {
+    const bool has_caps = !options_.over_holes && !now.surface->caps.empty();
+    std::optional<SurfaceDistance> caps;
+    if (has_caps) caps.emplace(now.surface->points, now.surface->caps);
+    for (UnmetPlace& ball : result_.excepted) {
+      if (caps && caps->at(ball.place, ball.distance) < ball.distance) ball.why = Unmet::hole;
+      ball.place += mesh_.origin;
+    }
   }
 
   /// Returns the uniform mesh at a voxel size; none if it is empty.
   std::optional<Attempt> attempt(double voxel_size) {
+    tried_ = voxel_size;
     Voxelization volume =
         voxelize(mesh_, {.voxel_size = voxel_size, .signs = options_.signs, .boundary = true}, context_);
     const bool keeps_thin = options_.thin == ThinRule::keep;
@@ -340,19 +438,22 @@ class BoundedRemesher {
   /// Returns positions where the uniform mesh and the surface are farther apart than the error.
   std::vector<Far> far_between_points(const Attempt& now, const SurfaceDistance& surface,
                                       const SurfaceDistance& uniform) const {
+    return compare(now, surface, uniform, Wanted::any_bound).far;
+  }
+  TwoSidedDistance compare(const Attempt& now, const SurfaceDistance& surface, const SurfaceDistance& uniform,
+                           Wanted wanted) const {
     const Stage stage(context_, "compare between points");
-    return proof_
-        .compare(now.file_points, now.fine.triangles(), now.offset, *now.surface, surface, uniform,
-                 Wanted::any_bound, context_)
-        .far;
+    return proof_.compare(now.file_points, now.fine.triangles(), now.offset, *now.surface, surface, uniform,
+                          wanted, context_);
   }
 
   /// Collapses with the rest of the error, again as long as that is worth it. Returns the positions where the
-  /// first time fails, or none, with the mesh in the result.
+  /// first time fails, or none, with the mesh in the result. With exceptions it does not fail.
   std::vector<Far> collapse_all(const Attempt& uniform, const SurfaceDistance& surface,
                                 const std::vector<double>& apart) {
     CertifiedMesh mesh;
-    std::vector<Far> far = collapse(uniform, surface, tolerances(uniform, apart, 0.0), mesh);
+    std::vector<Far> far =
+        collapse(uniform, surface, tolerances(uniform, apart, 0.0), mesh, excepted_.has_value());
     if (!far.empty()) return far;
     // The result may be collapsed again, because the proof is against the polygons each time. Two thirds of
     // the vertices that the first collapses leave on plane parts can be removed; of a scan next to none.
@@ -364,7 +465,7 @@ class BoundedRemesher {
                         FineMesh(mesh.points, mesh.triangles, context_),
                         uniform.in_file(mesh.points),
                         uniform.offset};
-      if (!collapse(now, surface, tolerances(now, apart_around_points(now, surface), kLeastShare), mesh)
+      if (!collapse(now, surface, tolerances(now, apart_around_points(now, surface), kLeastShare), mesh, false)
                .empty()) {
         const double work = result_.work;
         result_ = before;
@@ -387,47 +488,54 @@ class BoundedRemesher {
   }
 
   /// Collapses and proves. Returns the positions where the proof fails, or none, with `mesh` and the result
-  /// set.
+  /// set. @param excepts_rest true if positions that fail at last are exceptions, too
   std::vector<Far> collapse(const Attempt& now, const SurfaceDistance& surface, std::vector<float> tolerance,
-                            CertifiedMesh& mesh) {
+                            CertifiedMesh& mesh, bool excepts_rest) {
     // The mesh is then within the error by the triangle inequality, as far as the tolerances are right.
     std::vector<Far> far;
+    CertifiedMesh coarse;
     for (int lowerings = 0; lowerings <= kLowerings; ++lowerings, ++result_.rounds) {
-      CertifiedMesh coarse = decimate_certified(now.fine, tolerance, {}, now.file, context_);
+      coarse = decimate_certified(now.fine, tolerance, {}, now.file, context_);
       count_work(double(now.fine.points().size()));
       far = prove(now, surface, coarse);
-      // Only this mesh, proved in the precision of the file, is written.
-      if (far.empty()) {
-        result_.mesh.origin = now.file.placement().origin;
-        result_.mesh.points = now.in_file(coarse.points);
-        result_.mesh.triangles = coarse.triangles;
-        mesh = std::move(coarse);
-        break;
-      }
-      if (!lower_around(now, far, tolerance)) break;
+      if (far.empty() || !lower_around(now, far, tolerance)) break;
+    }
+    if (excepts_rest) far.clear();
+    // Only this mesh, proved in the precision of the file, is written.
+    if (far.empty()) {
+      result_.mesh.origin = now.file.placement().origin;
+      result_.mesh.points = now.in_file(coarse.points);
+      result_.mesh.triangles = coarse.triangles;
+      mesh = std::move(coarse);
     }
     return far;
   }
 
   /// Compares the mesh with the surface in both directions. Returns positions where the error may be
-  /// exceeded.
+  /// exceeded. With exceptions, those of the result become all such positions, and those near the ones of the
+  /// uniform mesh are not returned.
   std::vector<Far> prove(const Attempt& now, const SurfaceDistance& surface, const CertifiedMesh& coarse) {
     const Stage stage(context_, "prove");
     const std::vector<Eigen::Vector3f> points = now.in_file(coarse.points);
     TwoSidedDistance proved =
         proof_.compare(points, coarse.triangles, now.offset, *now.surface, surface,
-                       SurfaceDistance(points, coarse.triangles), Wanted::small_bound, context_);
+                       SurfaceDistance(points, coarse.triangles),
+                       excepted_ ? Wanted::far_pieces : Wanted::small_bound, context_);
     result_.to_surface = proved.to_surface;
     result_.from_surface = proved.from_surface;
     result_.free_area = proved.free_area;
+    if (!excepted_) return std::move(proved.far);
+    result_.excepted = Balls(proved.far, options_.error).list();
+    std::erase_if(proved.far, [&](const Far& piece) { return excepted_->nearly_contain(piece); });
     return std::move(proved.far);
   }
 
-  /// Lowers the tolerance around positions. Returns false if it is useless at one of them already.
+  /// Lowers the tolerance around positions. Returns false if it is useless at one of them already or, with
+  /// exceptions, at all of them.
   bool lower_around(const Attempt& now, const std::vector<Far>& far, std::vector<float>& tolerance) {
     const TriangleTree triangles(now.file_points, now.fine.triangles(), 1.0);
     std::vector<std::uint8_t> lowered(tolerance.size(), 0);
-    bool useful = true;
+    bool everywhere = true, somewhere = false;
     for (const Far& f : far) {
       const Eigen::Vector3d reach = Eigen::Vector3d::Constant(options_.error + 2.0 * now.voxel_size);
       const Eigen::Vector3d p = f.place - now.offset;
@@ -438,11 +546,13 @@ class BoundedRemesher {
           largest = std::max(largest, tolerance[corner]);
         }
       });
-      useful = useful && largest > kLeastTolerance;
+      const bool useful = largest > kLeastTolerance;
+      everywhere = everywhere && useful;
+      somewhere = somewhere || useful;
     }
     for (std::size_t i = 0; i < tolerance.size(); ++i)
       if (lowered[i]) tolerance[i] *= kLowering;
-    return useful;
+    return excepted_ ? somewhere : everywhere;
   }
 
   /// Adds the positions at which a hole is closed, where smaller voxels would not help. Returns true if there
@@ -494,6 +604,9 @@ class BoundedRemesher {
   const double longest_;  ///< side of the input's box, world units
   const TwoSidedProof proof_;
   double area_ = 0.0;
+  double tried_ = 0.0;  ///< voxel size of the last attempt
+  std::optional<Balls> excepted_;  ///< exceptions of the uniform mesh; none: exceptions are not permitted
+  std::shared_ptr<const SolidSurface> surface_;  ///< of the last attempt
   BoundedMesh result_;
 };
 
@@ -505,16 +618,26 @@ BoundedMesh bounded_remesh(const PolygonMesh& mesh, const BoundedRemeshOptions& 
     throw Error("the error must be a finite number above 0");
   if (mesh.empty()) throw Error("there are no polygons to remesh");
   const std::size_t notes = context.notes.size();
-  BoundedMesh made = BoundedRemesher(mesh, options, context).run();
+  BoundedRemesher remesher(mesh, options, context);
+  BoundedMesh made = remesher.run();
   const bool has_hole =
       std::ranges::any_of(made.unmet, [](const UnmetPlace& p) { return p.why == Unmet::hole; });
-  if (!has_hole || options.thin != ThinRule::keep || options.signs != SignRule::winding_number) return made;
-  // Open parts then enclose nothing, and become shells.
-  BoundedRemeshOptions open = options;
-  open.signs = SignRule::flood_fill;
+  if (has_hole && options.thin == ThinRule::keep && options.signs == SignRule::winding_number) {
+    // Open parts then enclose nothing, and become shells.
+    BoundedRemeshOptions open = options;
+    open.signs = SignRule::flood_fill;
+    context.notes.resize(notes);
+    BoundedMesh shell = BoundedRemesher(mesh, open, context).run();
+    if (shell.unmet.empty()) return shell;
+  }
+  if (made.unmet.empty() || !options.except_thin) return made;
   context.notes.resize(notes);
-  BoundedMesh shell = BoundedRemesher(mesh, open, context).run();
-  return shell.unmet.empty() ? shell : made;
+  return remesher.run_with_exceptions(std::move(made));
+}
+
+double BoundedMesh::excepted_area() const {
+  return std::transform_reduce(excepted.begin(), excepted.end(), 0.0, std::plus<>(),
+                               [](const UnmetPlace& ball) { return ball.area; });
 }
 
 std::vector<std::string> notes(const BoundedMesh& made) {
@@ -528,6 +651,30 @@ std::vector<std::string> notes(const BoundedMesh& made) {
     result.push_back("holes of " + text(made.hole_area) +
                      " in all, as area, were closed, where the bound is to the surface on which the winding "
                      "number is 1/2");
+  if (!made.excepted.empty()) {
+    const auto largest = std::ranges::max_element(made.excepted, {}, &UnmetPlace::radius);
+    const UnmetPlace& farthest = made.excepted.front();
+    result.push_back("the bound does NOT hold at " + std::to_string(made.excepted.size()) +
+                     (made.excepted.size() == 1 ? " place" : " places") +
+                     " (holes, walls or gaps too thin for the voxels), the largest within " +
+                     text(largest->radius) + " of " + text(largest->place) +
+                     ": polygons and mesh of " + text(made.excepted_area()) +
+                     " in all, as area, are not shown to be near, and the surfaces are at least " +
+                     text(farthest.distance) + " apart at " + text(farthest.place));
+  }
+  const Topology& before = made.topology;
+  const Topology after = topology_of(made.mesh.points, made.mesh.triangles);
+  if (after.components != before.components)
+    result.push_back("the mesh has " + std::to_string(after.components) +
+                     " components and the polygons that bound the solid have " +
+                     std::to_string(before.components) + " connected parts: " +
+                     (after.components > before.components
+                          ? "thin walls came apart or gaps were closed within the error"
+                          : "parts that touch, intersect or are within the error of each other were joined"));
+  if (before.genus && after.genus != before.genus)
+    result.push_back("the mesh has the genus " + std::to_string(*after.genus) +
+                     " and the polygons that bound the solid have " + std::to_string(*before.genus) +
+                     ": handles or tunnels were added or lost within the error");
   return result;
 }
 
@@ -541,7 +688,7 @@ std::string explanation(const BoundedMesh& refused) {
   switch (first.why) {
     case Unmet::hole:
       return at + "the polygons have a hole there, which has to be closed;" + distance +
-             "; give --over-holes to let the bound hold elsewhere";
+             "; give --over-holes to let the bound hold elsewhere, or --except-thin to except this place";
     case Unmet::thin:
       break;
   }
@@ -549,7 +696,8 @@ std::string explanation(const BoundedMesh& refused) {
                                                          " there is too thin for voxels of "
                                                    : "something there is too small for voxels of ";
   return at + what + text(refused.voxel_size) + ", the smallest that may be;" + distance +
-         "; raise the error, or allow smaller ones with --smallest-voxel and --limit-points";
+         "; raise the error, allow smaller ones with --smallest-voxel and --limit-points, or except such places "
+         "with --except-thin";
 }
 
 }  // namespace hermesh

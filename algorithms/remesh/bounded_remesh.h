@@ -15,6 +15,10 @@
 // surface in the same way: this, and nothing before it, is the proof (two_sided_proof.h). Where it fails, the
 // tolerance is lowered, or else the voxels are made smaller (voxel_size.h). The result is collapsed and
 // proved again, as long as that is worth it.
+//
+// **Exceptions.** If no voxel size reaches the bound and except_thin is set, voxels are made smaller as long
+// as that removes a quarter of the area that is too far. The proof then collects the pieces of both surfaces
+// that it cannot show to be near, and balls around them. It holds outside of these balls.
 #pragma once
 
 #include <Eigen/Core>
@@ -26,6 +30,7 @@
 #include "algorithms/core/polygon_mesh.h"
 #include "algorithms/core/run_context.h"
 #include "algorithms/remesh/thin_parts.h"
+#include "algorithms/remesh/topology.h"
 #include "algorithms/voxelization/hermesh_voxelizer.h"
 
 namespace hermesh {
@@ -46,6 +51,8 @@ struct BoundedRemeshOptions {
   /// With ThinRule::keep all polygons count that do not have the solid on both sides: thin and open parts are
   /// thickened within the error. Holes that may not be closed then make the polygons around them open parts.
   ThinRule thin = ThinRule::drop;
+  /// True if the bound need not hold in balls around the positions where it cannot be reached.
+  bool except_thin = false;
 };
 
 /// Reasons why the bound is not reached at a position.
@@ -57,13 +64,17 @@ struct UnmetPlace {
   Unmet why;
   Eigen::Vector3d place;  ///< world space
   double distance;        ///< lower bound between the surface and the mesh, world units
+  double radius = 0.0;    ///< of the ball around `place` within which the bound may not hold; world units
+  double area = 0.0;      ///< of the parts of polygons and mesh in the ball that are not shown to be near
 };
 
 /// Result of a bounded remeshing; lengths and areas in world units.
 struct BoundedMesh {
   PolygonMesh mesh;    ///< closed, manifold, oriented, free of self-intersection; empty if `unmet` is not
   double error = 0.0;  ///< as requested
-  double to_surface = 0.0, from_surface = 0.0;  ///< proved bounds of the distance, one per direction
+  /// Proved bounds of the distance, one per direction: of all points of the mesh from the surface, and of all
+  /// points of the surface from the mesh, except the points in the balls of `excepted`.
+  double to_surface = 0.0, from_surface = 0.0;
   double voxel_size = 0.0;
   int rounds = 0;              ///< number of times that voxels or tolerances were lowered
   double free_area = 0.0;      ///< area of polygons far from the mesh that bound nothing
@@ -73,12 +84,18 @@ struct BoundedMesh {
   double work = 0.0;           ///< vertices of all meshes made and polygons of thin parts, a measure of time
   double thickness = 0.0;      ///< of the part that is too thin at the first unmet position; 0: unknown
   std::optional<ThinParts> thin;  ///< none: nothing was thickened
-  std::vector<UnmetPlace> unmet;  ///< the most distant ones, farthest first
+  std::vector<UnmetPlace> unmet;     ///< the most distant ones, farthest first
+  std::vector<UnmetPlace> excepted;  ///< with BoundedRemeshOptions::except_thin; farthest first
+  double area = 0.0;                 ///< of the polygons
+  Topology topology;                 ///< of the polygons that bound the solid
+
+  /// Returns the sum of the areas of `excepted`.
+  double excepted_area() const;
 };
 
 /// Returns a closed, manifold mesh free of self-intersection whose two-sided distance from the polygons'
-/// surface is at most `options.error`, with few triangles; or the positions that prevent it. The same bytes
-/// for any number of threads.
+/// surface is at most `options.error`, with few triangles; or the positions that prevent it, which are
+/// excepted if the options permit it. The same bytes for any number of threads.
 /// @param mesh any polygons, with quads oriented so that diagonal 0–2 is their split
 /// @throws Error if the polygons define no inside, as voxelize(), and beyond `options.most_work`; Cancelled
 BoundedMesh bounded_remesh(const PolygonMesh& mesh, const BoundedRemeshOptions& options, RunContext& context);
@@ -93,7 +110,8 @@ inline constexpr double kBudgetWork = 2e6;
 BoundedMesh remesh_to_budget(const PolygonMesh& mesh, std::size_t triangles,
                              const BoundedRemeshOptions& options, RunContext& context);
 
-/// Returns notes on polygons that do not count for the bound, and on closed holes.
+/// Returns notes on polygons that do not count for the bound, on closed holes, on exceptions, and on a
+/// topology that differs from that of the polygons.
 std::vector<std::string> notes(const BoundedMesh& made);
 
 /// Returns the positions where the bound is not reached, the reasons and the remedies. Requires an unmet

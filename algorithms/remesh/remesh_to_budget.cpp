@@ -22,6 +22,8 @@ constexpr double kExact = 1e-5;
 /// plane. Large voxels suffice for these.
 constexpr std::array<double, 3> kPlaneErrors = {6e-3, 1e-3, 1e-4};
 constexpr double kPointsOfPlane = 1e5;
+/// Largest share of the polygons' area that may be excepted: otherwise ever smaller errors would fit.
+constexpr double kMostExcepted = 0.01;
 /// Work that a try counts for if it throws.
 constexpr double kWorkOfFailure = 3e5;
 
@@ -48,6 +50,7 @@ class Tries {
       BoundedMesh made = bounded_remesh(mesh_, limited, context_);
       work_ += made.work;
       count_ = made.mesh.triangle_count();
+      if (made.excepted_area() > kMostExcepted * made.area) return Outcome::refused;
       if (!made.unmet.empty()) {
         refused_ = std::move(made);
         return Outcome::refused;

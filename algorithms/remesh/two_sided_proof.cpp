@@ -83,13 +83,15 @@ TwoSidedDistance TwoSidedProof::compare(std::span<const Eigen::Vector3f> points,
                         const FreePieces& may_be_free) {
     return wanted == Wanted::any_bound
                ? other.hold(of, shift, held, error_, context, may_be_free, Wanted::any_bound)
-               : smallest_bound(other, of, shift, held, may_be_free, context);
+               : smallest_bound(other, of, shift, held, may_be_free, wanted, context);
   };
   const DistanceFromSurface there = hold(to, points, offset, triangles, {}),
                             back = hold(from, surface.points, -offset, surface.triangles, free);
   TwoSidedDistance result{there.upper, back.upper, back.free_area, {}};
-  for (const FarTriangle& f : there.far) result.far.push_back({f.place + offset, f.distance, false});
-  for (const FarTriangle& f : back.far) result.far.push_back({f.place, f.distance, true, f.triangle});
+  for (const FarTriangle& f : there.far)
+    result.far.push_back({f.place + offset, f.distance, false, 0, f.radius, f.area});
+  for (const FarTriangle& f : back.far)
+    result.far.push_back({f.place, f.distance, true, f.triangle, f.radius, f.area});
   return result;
 }
 
@@ -99,7 +101,7 @@ DistanceFromSurface TwoSidedProof::smallest_bound(const SurfaceDistance& to,
                                                   std::span<const Eigen::Vector3f> points,
                                                   const Eigen::Vector3d& offset,
                                                   std::vector<Triangle> triangles, const FreePieces& free,
-                                                  const RunContext& context) const {
+                                                  Wanted wanted, const RunContext& context) const {
   DistanceFromSurface all;
   std::vector<std::uint32_t> numbers(triangles.size());
   std::iota(numbers.begin(), numbers.end(), 0u);
@@ -108,7 +110,8 @@ DistanceFromSurface TwoSidedProof::smallest_bound(const SurfaceDistance& to,
     if (is_last) limit = error_;
     // Before the last limit nothing is free, because a far piece may still be near enough.
     DistanceFromSurface now =
-        to.hold(points, offset, triangles, limit, context, is_last ? free : FreePieces{});
+        to.hold(points, offset, triangles, limit, context, is_last ? free : FreePieces{},
+                is_last ? wanted : Wanted::small_bound);
     all.upper = std::max(all.upper, now.upper);
     all.free_area += now.free_area;
     // Only triangles beyond this limit are compared with the next.

@@ -39,11 +39,12 @@ struct Far {
   double distance;
   bool of_surface;             ///< it lies on the surface, otherwise on the mesh
   std::uint32_t triangle = 0;  ///< of the surface, if it lies on that
+  double radius = 0.0, area = 0.0;  ///< of the piece around it, with Wanted::far_pieces (FarTriangle)
 };
 
 /// The proved two-sided distance, world units.
 struct TwoSidedDistance {
-  double to_surface = 0.0, from_surface = 0.0;  ///< upper bounds, if `far` is empty
+  double to_surface = 0.0, from_surface = 0.0;  ///< upper bounds, except at `far`
   double free_area = 0.0;                       ///< area of polygons far from the mesh that bound nothing
   std::vector<Far> far;                         ///< positions where the error is exceeded, or may be
 };
@@ -68,7 +69,7 @@ class TwoSidedProof {
   /// Compares a mesh with the surface. `points` are relative to a position that is `offset` from the
   /// polygons' origin; `to` and `from` measure the distances to the surface and to the mesh. With
   /// Wanted::any_bound the bounds are at most the error; otherwise they are minimal, to a few hundredths of
-  /// it.
+  /// it. With Wanted::far_pieces they hold for all points outside of the balls around the pieces in `far`.
   /// @throws Cancelled
   TwoSidedDistance compare(std::span<const Eigen::Vector3f> points, const std::vector<Triangle>& triangles,
                            const Eigen::Vector3d& offset, const SolidSurface& surface,
@@ -79,7 +80,7 @@ class TwoSidedProof {
   bool bounds_nothing(const std::array<Eigen::Vector3d, 3>& piece) const;
   DistanceFromSurface smallest_bound(const SurfaceDistance& to, std::span<const Eigen::Vector3f> points,
                                      const Eigen::Vector3d& offset, std::vector<Triangle> triangles,
-                                     const FreePieces& free, const RunContext& context) const;
+                                     const FreePieces& free, Wanted wanted, const RunContext& context) const;
 
   const double error_, rounding_;  ///< world units
   const bool keeps_open_;

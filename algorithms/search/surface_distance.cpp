@@ -17,6 +17,8 @@ using Corners = std::array<Eigen::Vector3d, 3>;
 // digit.
 constexpr std::size_t kMostPieces = 4'000'000;
 constexpr double kSmallestPiece = 1.0 / 4096.0;  // of the limit
+/// With Wanted::far_pieces: the same, and the largest radius of pieces that are listed, in limits.
+constexpr double kSmallestListed = 1.0 / 16.0, kLargestListed = 0.5;
 /// Points of a piece are tested in rows: largest distance of a point of the piece from the nearest of them,
 /// in limits; most parts of a side; and least height of a piece, in its longest side, so that rows are no
 /// closer than necessary.
@@ -56,9 +58,11 @@ class SurfaceDistance::Walk {
         free_(free),
         wanted_(wanted) {}
 
-  /// Returns true if each point of the triangle is within the limit; then `upper` is at least the largest
-  /// distance, else `far` has a point.
-  bool holds(const Corners& triangle, double& upper, double& free_area, FarTriangle& far) {
+  /// Tests triangle `number`. Then `upper` is at least the largest distance, or a piece was added to `far`,
+  /// all of its far pieces with Wanted::far_pieces.
+  void test(const Corners& triangle, std::uint32_t number, DistanceFromSurface& result) {
+    const bool lists = wanted_ == Wanted::far_pieces;
+    double& upper = result.upper;
     // Neighbours are most often near the same triangle, even if it is not the nearest to each.
     stack_.assign(1, {triangle, wanted_ == Wanted::any_bound ? last_ : TriangleTree::kNone});
     std::size_t pieces = 0;
@@ -81,24 +85,28 @@ class SurfaceDistance::Walk {
         upper = std::max(upper, distance + radius);
         continue;
       }
-      const bool is_last = ++pieces > kMostPieces || radius < kSmallestPiece * limit_;
+      const bool is_last =
+          ++pieces > kMostPieces || radius < (lists ? kSmallestListed : kSmallestPiece) * limit_;
+      const auto piece_area = [&] {
+        return 0.5 * (piece.corners[1] - piece.corners[0]).cross(piece.corners[2] - piece.corners[0]).norm();
+      };
       // The last pieces between near and free parts are a little too far, though their middles are not.
       if (free_.is_free && (is_last || (is_far && radius <= free_.radius)) && is_free(piece.corners)) {
-        free_area +=
-            0.5 * (piece.corners[1] - piece.corners[0]).cross(piece.corners[2] - piece.corners[0]).norm();
+        result.free_area += piece_area();
         continue;
       }
       // A piece that is certainly far may still contain free pieces.
-      if (is_last || (is_far && (!free_.is_free || radius <= free_.radius))) {
-        far.place = middle;
-        far.distance = distance;
-        return false;
+      if (is_last || (is_far && (lists ? radius <= kLargestListed * limit_ &&
+                                             !(free_.is_free && is_free(piece.corners))
+                                       : !free_.is_free || radius <= free_.radius))) {
+        result.far.push_back({number, middle - offset_, distance, radius, piece_area()});
+        if (!lists) return;
+        continue;
       }
       if (!is_far && found.triangle != piece.nearest && all_near(piece.corners, found.triangle, upper))
         continue;
       if (is_far || !cut_along(piece.corners, found.triangle)) halve(piece.corners, found.triangle);
     }
-    return true;
   }
 
  private:
@@ -243,24 +251,20 @@ DistanceFromSurface SurfaceDistance::hold(std::span<const Eigen::Vector3f> point
                                           Wanted wanted) const {
   // Results of each block of triangles have their own entry.
   constexpr std::size_t kBlock = 64;
-  std::vector<std::vector<FarTriangle>> far((triangles.size() + kBlock - 1) / kBlock);
-  std::vector<double> upper(far.size(), 0.0), free_area(far.size(), 0.0);
-  parallel_blocks(far.size(), context, [&](std::size_t block) {
+  std::vector<DistanceFromSurface> blocks((triangles.size() + kBlock - 1) / kBlock);
+  parallel_blocks(blocks.size(), context, [&](std::size_t block) {
     Walk walk(*this, limit, offset, free, wanted, context);
     for (std::size_t t = block * kBlock; t < std::min(triangles.size(), (block + 1) * kBlock); ++t) {
       Corners corners;
       for (int i = 0; i < 3; ++i) corners[i] = offset + points[triangles[t][i]].cast<double>();
-      FarTriangle found{static_cast<std::uint32_t>(t), {}, 0.0};
-      if (walk.holds(corners, upper[block], free_area[block], found)) continue;
-      found.place -= offset;
-      far[block].push_back(found);
+      walk.test(corners, static_cast<std::uint32_t>(t), blocks[block]);
     }
   });
   DistanceFromSurface result;
-  for (std::size_t block = 0; block < far.size(); ++block) {
-    result.upper = std::max(result.upper, upper[block]);
-    result.free_area += free_area[block];
-    result.far.insert(result.far.end(), far[block].begin(), far[block].end());
+  for (const DistanceFromSurface& block : blocks) {
+    result.upper = std::max(result.upper, block.upper);
+    result.free_area += block.free_area;
+    result.far.insert(result.far.end(), block.far.begin(), block.far.end());
   }
   // The limit was lowered by as much, so this is at most the limit.
   result.upper += rounding_;

@@ -14,11 +14,14 @@
 
 namespace hermesh {
 
-/// A triangle that is farther from the other surface than the limit, or not shown to be within it.
+/// A triangle that is farther from the other surface than the limit, or not shown to be within it; or, with
+/// Wanted::far_pieces, such a piece of one.
 struct FarTriangle {
   std::uint32_t triangle;  ///< its number among the tested ones
   Eigen::Vector3d place;   ///< a point on it, in the frame of the tested points
   double distance;         ///< of that point from the other surface, at most twice the limit
+  double radius = 0.0;     ///< of a ball around `place` that contains the piece
+  double area = 0.0;       ///< of the piece
 };
 
 /// Result of SurfaceDistance::hold().
@@ -26,7 +29,7 @@ struct DistanceFromSurface {
   /// Upper bound of the distance of the triangles that are not in `far`; at most the limit.
   double upper = 0.0;
   double free_area = 0.0;        ///< area of the free pieces, in the units of the points squared
-  std::vector<FarTriangle> far;  ///< ascending by number
+  std::vector<FarTriangle> far;  ///< ascending by number of the triangle
 };
 
 /// Parts of the tested triangles that need not be near.
@@ -38,8 +41,9 @@ struct FreePieces {
   double radius = 0.0;
 };
 
-/// Requested result: a bound of the near parts as small as possible, or any bound within the limit, faster.
-enum class Wanted { small_bound, any_bound };
+/// Requested result: a bound of the near parts as small as possible; any bound within the limit, faster; or a
+/// small bound and all pieces that it does not hold for, most of them within half of the limit of their place.
+enum class Wanted { small_bound, any_bound, far_pieces };
 
 /// A triangle soup that distances are measured to.
 ///

@@ -38,7 +38,7 @@ struct ConvertArguments {
   // The bound of a mesh.
   std::string error;                      ///< a number, with % or a unit behind it; empty: not given
   std::optional<std::int64_t> triangles;  ///< budget
-  bool over_holes = false;
+  bool over_holes = false, except_thin = false;
   std::optional<double> most_points;
   double smallest_voxel = 0.0;  ///< world units; 0: not given
 };
@@ -289,6 +289,19 @@ double error_in_world_units(const std::string& text, const std::string& units, d
   return value * *metres;
 }
 
+/// Adds the balls outside of which the bound holds to the JSON document.
+void report_exceptions(const BoundedMesh& bounded, Session& session) {
+  Json balls = Json::array();
+  for (const UnmetPlace& ball : bounded.excepted)
+    balls.push_back({{"position", {ball.place.x(), ball.place.y(), ball.place.z()}},
+                     {"radius", ball.radius},
+                     {"distance", ball.distance},
+                     {"area", ball.area},
+                     {"reason", ball.why == Unmet::hole ? "hole" : "thin"}});
+  made(session, "exceptions", balls);
+  made(session, "excepted_area", bounded.excepted_area());
+}
+
 int run_bounded(const ConvertArguments& arguments, const CLI::App& command, Session& session) {
   refuse_idle(command,
               {"--extractor", "-o", "--voxelizer", "--voxelizer-option", "--exterior-band", "--interior-band",
@@ -306,7 +319,8 @@ int run_bounded(const ConvertArguments& arguments, const CLI::App& command, Sess
       .most_points = arguments.most_points.value_or(arguments.triangles ? 4e5 : 3e7),
       .smallest_voxel = arguments.smallest_voxel,
       .written_in_single = is_written_in_single(paths.out),
-      .thin = arguments.voxelizing.thin.value_or("keep") == "keep" ? ThinRule::keep : ThinRule::drop};
+      .thin = arguments.voxelizing.thin.value_or("keep") == "keep" ? ThinRule::keep : ThinRule::drop,
+      .except_thin = arguments.except_thin};
   check_mesh_output(paths.out);
   const PolygonMesh mesh = read_polygons(paths.in, session);
   const double diagonal = bounds(mesh).size().norm();
@@ -336,12 +350,13 @@ int run_bounded(const ConvertArguments& arguments, const CLI::App& command, Sess
   for (const std::string& note : notes(made)) session.context.note(note);
   if (made.thin) session.context.note(thin_note(*made.thin, made.voxel_size));
   report_thin_parts(made.thin, session);
+  report_exceptions(made, session);
   print_extracted(session, made.mesh, "voxels of " + text(made.voxel_size), watch.seconds());
   const double bound = std::max(made.to_surface, made.from_surface);
   print_summary(session, "certified: the mesh is within " + text(made.to_surface) +
                              " of the polygons' solid, and the solid within " + text(made.from_surface) +
-                             " of the mesh (" + text(100.0 * bound / diagonal) + "% of the diagonal)");
-  note_components(mesh, made.mesh, session.context);
+                             " of the mesh (" + text(100.0 * bound / diagonal) + "% of the diagonal)" +
+                             (made.excepted.empty() ? "" : ", EXCEPT at the places of a note"));
   return save(arguments, made.mesh, session);
 }
 
@@ -393,6 +408,10 @@ void add_bound_options(CLI::App& command, CLI::App& size, ConvertArguments& argu
   group->add_flag("--over-holes", arguments.over_holes,
                   "Allow the mesh to close holes; the bound there is to the surface where the winding number "
                   "is 1/2");
+  group->add_flag("--except-thin", arguments.except_thin,
+                  "Where the bound cannot be reached (holes, walls and gaps too thin for the voxels), let it "
+                  "hold elsewhere, and list these places in a note and in --json as balls (default: the "
+                  "command fails)");
   group
       ->add_option("--limit-points", arguments.most_points,
                    "Maximum number of vertices of the finest mesh (default: 3e7, some 9 GiB, with --error; "
@@ -441,7 +460,7 @@ void add_conversions(CLI::App& app, Session& session) {
   add_bound_options(*command, *size, *arguments);
   set_work(*command, session, [arguments, command, &session] {
     if (arguments->triangles || !arguments->error.empty()) return run_bounded(*arguments, *command, session);
-    refuse_idle(*command, {"--over-holes", "--limit-points", "--smallest-voxel"},
+    refuse_idle(*command, {"--over-holes", "--except-thin", "--limit-points", "--smallest-voxel"},
                 "it needs --error or --triangles");
     return run_remesh(*arguments, session);
   });
