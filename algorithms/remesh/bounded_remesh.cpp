@@ -465,7 +465,8 @@ class BoundedRemesher {
                         FineMesh(mesh.points, mesh.triangles, context_),
                         uniform.in_file(mesh.points),
                         uniform.offset};
-      if (!collapse(now, surface, tolerances(now, apart_around_points(now, surface), kLeastShare), mesh, false)
+      if (!collapse(now, surface, tolerances(now, apart_around_points(now, surface), kLeastShare), mesh,
+                    false)
                .empty()) {
         const double work = result_.work;
         result_ = before;
@@ -517,10 +518,9 @@ class BoundedRemesher {
   std::vector<Far> prove(const Attempt& now, const SurfaceDistance& surface, const CertifiedMesh& coarse) {
     const Stage stage(context_, "prove");
     const std::vector<Eigen::Vector3f> points = now.in_file(coarse.points);
-    TwoSidedDistance proved =
-        proof_.compare(points, coarse.triangles, now.offset, *now.surface, surface,
-                       SurfaceDistance(points, coarse.triangles),
-                       excepted_ ? Wanted::far_pieces : Wanted::small_bound, context_);
+    TwoSidedDistance proved = proof_.compare(points, coarse.triangles, now.offset, *now.surface, surface,
+                                             SurfaceDistance(points, coarse.triangles),
+                                             excepted_ ? Wanted::far_pieces : Wanted::small_bound, context_);
     result_.to_surface = proved.to_surface;
     result_.from_surface = proved.from_surface;
     result_.free_area = proved.free_area;
@@ -604,7 +604,7 @@ class BoundedRemesher {
   const double longest_;  ///< side of the input's box, world units
   const TwoSidedProof proof_;
   double area_ = 0.0;
-  double tried_ = 0.0;  ///< voxel size of the last attempt
+  double tried_ = 0.0;             ///< voxel size of the last attempt
   std::optional<Balls> excepted_;  ///< exceptions of the uniform mesh; none: exceptions are not permitted
   std::shared_ptr<const SolidSurface> surface_;  ///< of the last attempt
   BoundedMesh result_;
@@ -641,6 +641,9 @@ double BoundedMesh::excepted_area() const {
 }
 
 std::vector<std::string> notes(const BoundedMesh& made) {
+  const auto counted = [](std::size_t n, const std::string& what) {
+    return std::to_string(n) + " " + what + (n == 1 ? "" : "s");
+  };
   std::vector<std::string> result;
   if (made.free_area > 0.0)
     result.push_back("polygons of " + text(made.free_area) +
@@ -654,20 +657,19 @@ std::vector<std::string> notes(const BoundedMesh& made) {
   if (!made.excepted.empty()) {
     const auto largest = std::ranges::max_element(made.excepted, {}, &UnmetPlace::radius);
     const UnmetPlace& farthest = made.excepted.front();
-    result.push_back("the bound does NOT hold at " + std::to_string(made.excepted.size()) +
-                     (made.excepted.size() == 1 ? " place" : " places") +
+    result.push_back("the bound does NOT hold at " + counted(made.excepted.size(), "place") +
                      " (holes, walls or gaps too thin for the voxels), the largest within " +
-                     text(largest->radius) + " of " + text(largest->place) +
-                     ": polygons and mesh of " + text(made.excepted_area()) +
+                     text(largest->radius) + " of " + text(largest->place) + ": polygons and mesh of " +
+                     text(made.excepted_area()) +
                      " in all, as area, are not shown to be near, and the surfaces are at least " +
                      text(farthest.distance) + " apart at " + text(farthest.place));
   }
   const Topology& before = made.topology;
   const Topology after = topology_of(made.mesh.points, made.mesh.triangles);
   if (after.components != before.components)
-    result.push_back("the mesh has " + std::to_string(after.components) +
-                     " components and the polygons that bound the solid have " +
-                     std::to_string(before.components) + " connected parts: " +
+    result.push_back("the mesh has " + counted(after.components, "component") +
+                     " and the polygons that bound the solid have " +
+                     counted(before.components, "connected part") + ": " +
                      (after.components > before.components
                           ? "thin walls came apart or gaps were closed within the error"
                           : "parts that touch, intersect or are within the error of each other were joined"));
@@ -696,7 +698,8 @@ std::string explanation(const BoundedMesh& refused) {
                                                          " there is too thin for voxels of "
                                                    : "something there is too small for voxels of ";
   return at + what + text(refused.voxel_size) + ", the smallest that may be;" + distance +
-         "; raise the error, allow smaller ones with --smallest-voxel and --limit-points, or except such places "
+         "; raise the error, allow smaller ones with --smallest-voxel and --limit-points, or except such "
+         "places "
          "with --except-thin";
 }
 

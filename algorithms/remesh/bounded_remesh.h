@@ -83,7 +83,7 @@ struct BoundedMesh {
   double hole_area = 0.0;      ///< area of the caps that close holes
   double work = 0.0;           ///< vertices of all meshes made and polygons of thin parts, a measure of time
   double thickness = 0.0;      ///< of the part that is too thin at the first unmet position; 0: unknown
-  std::optional<ThinParts> thin;  ///< none: nothing was thickened
+  std::optional<ThinParts> thin;     ///< none: nothing was thickened
   std::vector<UnmetPlace> unmet;     ///< the most distant ones, farthest first
   std::vector<UnmetPlace> excepted;  ///< with BoundedRemeshOptions::except_thin; farthest first
   double area = 0.0;                 ///< of the polygons

@@ -11,9 +11,7 @@ namespace hermesh {
 Topology topology_of(std::span<const Eigen::Vector3f> points, std::span<const Triangle> triangles) {
   std::vector<std::uint32_t> order(points.size()), number(points.size());
   std::iota(order.begin(), order.end(), 0u);
-  const auto key = [&](std::uint32_t i) {
-    return std::array{points[i].x(), points[i].y(), points[i].z()};
-  };
+  const auto key = [&](std::uint32_t i) { return std::array{points[i].x(), points[i].y(), points[i].z()}; };
   std::sort(order.begin(), order.end(), [&](std::uint32_t a, std::uint32_t b) { return key(a) < key(b); });
   for (std::size_t i = 0; i < order.size(); ++i)
     number[order[i]] = i > 0 && key(order[i]) == key(order[i - 1]) ? number[order[i - 1]] : order[i];
@@ -44,8 +42,7 @@ Topology topology_of(std::span<const Eigen::Vector3f> points, std::span<const Tr
     if (!is_pair || (i > 0 && edges[i] == edges[i - 1])) return result;
   }
   // Euler's formula: vertices - edges + faces = 2 (components - genus), with half an edge per entry.
-  result.genus =
-      std::int64_t(result.components) - (vertices - std::int64_t(edges.size() / 2) + faces) / 2;
+  result.genus = std::int64_t(result.components) - (vertices - std::int64_t(edges.size() / 2) + faces) / 2;
   return result;
 }
 

@@ -109,9 +109,8 @@ DistanceFromSurface TwoSidedProof::smallest_bound(const SurfaceDistance& to,
     const bool is_last = limit >= error_;
     if (is_last) limit = error_;
     // Before the last limit nothing is free, because a far piece may still be near enough.
-    DistanceFromSurface now =
-        to.hold(points, offset, triangles, limit, context, is_last ? free : FreePieces{},
-                is_last ? wanted : Wanted::small_bound);
+    DistanceFromSurface now = to.hold(points, offset, triangles, limit, context,
+                                      is_last ? free : FreePieces{}, is_last ? wanted : Wanted::small_bound);
     all.upper = std::max(all.upper, now.upper);
     all.free_area += now.free_area;
     // Only triangles beyond this limit are compared with the next.

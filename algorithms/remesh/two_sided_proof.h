@@ -37,8 +37,8 @@ SolidSurface surface_of(BoundaryTriangles boundary, std::span<const std::int8_t>
 struct Far {
   Eigen::Vector3d place;
   double distance;
-  bool of_surface;             ///< it lies on the surface, otherwise on the mesh
-  std::uint32_t triangle = 0;  ///< of the surface, if it lies on that
+  bool of_surface;                  ///< it lies on the surface, otherwise on the mesh
+  std::uint32_t triangle = 0;       ///< of the surface, if it lies on that
   double radius = 0.0, area = 0.0;  ///< of the piece around it, with Wanted::far_pieces (FarTriangle)
 };
 

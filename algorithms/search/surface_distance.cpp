@@ -96,9 +96,9 @@ class SurfaceDistance::Walk {
         continue;
       }
       // A piece that is certainly far may still contain free pieces.
-      if (is_last || (is_far && (lists ? radius <= kLargestListed * limit_ &&
-                                             !(free_.is_free && is_free(piece.corners))
-                                       : !free_.is_free || radius <= free_.radius))) {
+      if (is_last ||
+          (is_far && (lists ? radius <= kLargestListed * limit_ && !(free_.is_free && is_free(piece.corners))
+                            : !free_.is_free || radius <= free_.radius))) {
         result.far.push_back({number, middle - offset_, distance, radius, piece_area()});
         if (!lists) return;
         continue;

@@ -42,7 +42,8 @@ struct FreePieces {
 };
 
 /// Requested result: a bound of the near parts as small as possible; any bound within the limit, faster; or a
-/// small bound and all pieces that it does not hold for, most of them within half of the limit of their place.
+/// small bound and all pieces that it does not hold for, most of them within half of the limit of their
+/// place.
 enum class Wanted { small_bound, any_bound, far_pieces };
 
 /// A triangle soup that distances are measured to.

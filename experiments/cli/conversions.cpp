@@ -76,17 +76,32 @@ VoxelizeRecipe VoxelizeArguments::recipe(const PolygonMesh& mesh, const std::str
           .thin = thin_rule(isovalue)};
 }
 
-CLI::App* add_voxelize_options(CLI::App& command, VoxelizeArguments& arguments, bool with_like) {
-  CLI::Option_group* size = command.add_option_group("Voxel size, exactly one of");
+CLI::App* add_voxelize_options(CLI::App& command, VoxelizeArguments& arguments, bool with_like,
+                               bool with_auto) {
+  CLI::Option_group* size =
+      command.add_option_group(with_auto ? "Voxel size, at most one of" : "Voxel size, exactly one of");
   size->add_option("--voxel-size", arguments.voxel_size, "Edge length of a voxel in world units")
       ->check(finite_number(std::numeric_limits<double>::min(), "a finite number above 0"));
-  size->add_option("--resolution", arguments.resolution, "Voxels along the longest side of the mesh")
-      ->transform(whole_number(1, std::int64_t(1) << 40));
+  const CLI::Validator number = whole_number(1, std::int64_t(1) << 40);
+  size->add_option("--resolution", arguments.resolution,
+                   with_auto
+                       ? "Voxels along the longest side of the mesh, or auto (default): from 200 to 2000, "
+                         "so many that at most 1 % of the visible surface is at walls and gaps too thin "
+                         "for them, within limits of memory and time that are printed"
+                       : "Voxels along the longest side of the mesh")
+      ->transform(with_auto ? CLI::Validator(
+                                  [number](std::string& given) {
+                                    if (given != "auto") return number(given);
+                                    given = "0";
+                                    return std::string();
+                                  },
+                                  "")
+                            : number);
   if (with_like)
     size->add_option("--like", arguments.like,
                      "A .vdb whose first float grid gives voxel size, rotation and position, so that both "
                      "volumes share one lattice");
-  size->require_option(1);
+  size->require_option(with_auto ? 0 : 1, 1);
   command.add_option("--voxelizer", arguments.voxelizer,
                      "Name of the voxelizer, see hermesh list (default: " + arguments.voxelizer + ")");
   command.add_option(

@@ -17,7 +17,7 @@ inline constexpr const char* kMeshOut =
 
 struct VoxelizeArguments {
   std::optional<double> voxel_size;                 ///< world units
-  std::optional<std::int64_t> resolution;           ///< voxels along the longest side of the mesh
+  std::optional<std::int64_t> resolution;           ///< voxels along the longest side of the mesh; 0: auto
   std::optional<std::string> like;                  ///< .vdb file whose lattice the volume shares
   bool any_size = false;                            ///< true if the mesh may be smaller than a voxel
   double exterior_band = 3.0, interior_band = 3.0;  ///< voxels
@@ -47,9 +47,11 @@ struct ExtractorArguments {
   void choose();
 };
 
-/// Adds the options of VoxelizeArguments, --like only if `with_like`. Returns the group of those that
-/// determine the voxel size, exactly one of which is required.
-CLI::App* add_voxelize_options(CLI::App& command, VoxelizeArguments& arguments, bool with_like = false);
+/// Adds the options of VoxelizeArguments, --like only if `with_like`, and `auto` as a resolution, which is
+/// then the default, only if `with_auto`. Returns the group of those that determine the voxel size, exactly
+/// one of which is required unless there is a default.
+CLI::App* add_voxelize_options(CLI::App& command, VoxelizeArguments& arguments, bool with_like = false,
+                               bool with_auto = false);
 void add_extractor_options(CLI::App& command, ExtractorArguments& arguments, const std::string& fallback);
 
 /// Reads a mesh to voxelize, in world units (session.scale), with quads cut along the better diagonal.

@@ -13,6 +13,7 @@
 #include "algorithms/extraction/volume_attributes.h"
 #include "algorithms/io/vdb_file.h"
 #include "algorithms/io/written_precision.h"
+#include "algorithms/remesh/auto_voxel.h"
 #include "algorithms/remesh/bounded_remesh.h"
 #include "experiments/cli/cli11.h"
 #include "experiments/cli/conversions.h"
@@ -231,6 +232,35 @@ double most_loss(const std::string& text, ThinRule rule) {
   return percent / 100.0;
 }
 
+/// Chooses the voxel size, and prints it with its cost before the work starts.
+void choose_voxel_size(const PolygonMesh& mesh, VoxelizeArguments& voxelizing, Session& session) {
+  const AutoVoxelLimits limits;
+  const AutoVoxel chosen = auto_voxel(mesh, limits, session.context);
+  voxelizing.resolution = std::int64_t(limits.fewest_voxels);  // for the message if there is no extent
+  if (!(chosen.voxel_size > 0.0)) return;
+  voxelizing.voxel_size = chosen.voxel_size;
+  const auto percent = [](double share) { return text(std::round(1e4 * share) / 100.0) + " %"; };
+  const double bytes = kRemeshBytes * chosen.points, seconds = kRemeshSeconds * chosen.points;
+  made(session, "auto",
+       {{"thin_share", chosen.thin_share},
+        {"wanted_voxel_size", chosen.wanted},
+        {"estimated_bytes", bytes},
+        {"estimated_seconds", seconds}});
+  print_summary(session, "resolution auto: voxels of " + text(chosen.voxel_size) + ", " +
+                             text(std::round(bounds(mesh).size().maxCoeff() / chosen.voxel_size)) +
+                             " along the longest side, about " + text(std::ceil(bytes / (1 << 20))) +
+                             " MiB and " + text(std::ceil(seconds)) +
+                             " s (limits: " + text(limits.most_voxels) + " voxels, " +
+                             text(std::ceil(kRemeshBytes * limits.most_points / (1 << 20))) + " MiB, " +
+                             text(std::ceil(kRemeshSeconds * limits.most_points)) + " s); " +
+                             percent(chosen.thin_share) + " of the visible surface is at thinner parts");
+  if (chosen.thin_share > limits.share)
+    session.context.note(
+        "at the limits of --resolution auto, walls and gaps are too thin for the voxels at " +
+        percent(chosen.thin_share) + " of the visible surface; voxels of " + text(chosen.wanted) +
+        " would leave " + percent(limits.share) + " (--voxel-size)");
+}
+
 int run_remesh(ConvertArguments& arguments, Session& session) {
   VoxelizeArguments& voxelizing = arguments.voxelizing;
   const Paths& paths = arguments.paths;
@@ -242,6 +272,8 @@ int run_remesh(ConvertArguments& arguments, Session& session) {
   const double max_loss = most_loss(arguments.max_loss, voxelizing.thin ? rule : ThinRule::keep);
   const std::optional<AdaptivityField> field = read_adaptivity(arguments, session);
   const PolygonMesh mesh = read_polygons(paths.in, session);
+  if (!voxelizing.voxel_size && voxelizing.resolution.value_or(0) == 0)
+    choose_voxel_size(mesh, voxelizing, session);
   const VoxelizeRecipe recipe = voxelizing.recipe(mesh, paths.in, arguments.isovalue);
   const Remeshed made = about_file(
       paths.in, [&] { return remesh(mesh, recipe, extract_recipe(arguments, field), session.context); });
@@ -452,7 +484,7 @@ void add_conversions(CLI::App& app, Session& session) {
   command = add_command(app, session, "remesh", "Convert polygons to a level set and back to a mesh");
   add_paths(*command, session, arguments->paths, kMeshIn, FileKind::mesh, kMeshOut, FileKind::mesh, true);
   add_json_option(*command, session);
-  CLI::App* size = add_voxelize_options(*command, arguments->voxelizing);
+  CLI::App* size = add_voxelize_options(*command, arguments->voxelizing, false, true);
   add_extract_options(*command, *arguments, "manifold-dual-contouring");
   command->add_option("--max-loss", arguments->max_loss,
                       "Exit with 3 if more of the visible surface is lost, such as 1% (default: no limit, or "

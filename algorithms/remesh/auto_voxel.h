@@ -1,0 +1,39 @@
+// The voxel size for which hardly any visible wall or gap is too thin.
+//
+// **The rule.** A wall is thickened if it is thinner than 1.2 voxels (2 kShellRadius), and a gap is filled if
+// it is thinner than a voxel. At each of 10,000 points, evenly distributed over the polygons' area, the wall
+// behind the polygon and the gap in front of it are measured along its normal, as in thin_parts.h: up to the
+// next polygon, if that is roughly parallel and faces away from the point, or faces it. Points that no ray
+// leaves the polygons from are not visible and do not count. The voxel size is the largest for which at most
+// the given share of the visible points is at a wall or gap that is too thin, within limits. Open surfaces
+// have no thickness that smaller voxels could show.
+#pragma once
+
+#include "algorithms/core/polygon_mesh.h"
+#include "algorithms/core/run_context.h"
+
+namespace hermesh {
+
+struct AutoVoxelLimits {
+  double share = 0.01;           ///< of the visible surface that may be thickened or filled
+  double fewest_voxels = 200.0;  ///< along the longest side
+  double most_voxels = 2000.0;   ///< along the longest side
+  /// Largest estimated number of vertices of the uniform mesh. It takes precedence over fewest_voxels.
+  double most_points = 2e6;
+};
+
+/// Estimated peak memory and, on two cores, time of remesh() per vertex of the uniform mesh.
+inline constexpr double kRemeshBytes = 700.0, kRemeshSeconds = 1e-5;
+
+struct AutoVoxel {
+  double voxel_size = 0.0;  ///< world units; 0 for polygons without extent
+  double points = 0.0;      ///< estimated number of vertices of the uniform mesh
+  /// Share of the visible surface at walls and gaps that are too thin for the voxels.
+  double thin_share = 0.0;
+  double wanted = 0.0;  ///< voxel size without limits for small voxels, world units
+};
+
+/// Returns the voxel size of the rule above. The same for every number of threads. @throws Cancelled
+AutoVoxel auto_voxel(const PolygonMesh& mesh, const AutoVoxelLimits& limits, RunContext& context);
+
+}  // namespace hermesh
