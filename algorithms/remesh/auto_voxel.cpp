@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numeric>
+#include <utility>
 #include <vector>
 
 #include "algorithms/core/parallel.h"
@@ -17,14 +19,49 @@ namespace {
 
 using Eigen::Vector3d;
 
-constexpr std::size_t kSamples = 10'000;
+constexpr std::size_t kSamples = 10'000, kSamplesOfOpen = 625;
 /// Vertices of the uniform mesh per area of a voxel's face: a surface intersects about one and a half cells.
 constexpr double kPointsOfFace = 1.5;
+/// Memory and time for such a vertex, and the factor of the time at open surfaces, which get a shell.
+constexpr double kBytes = 700.0, kSeconds = 1e-5, kOpenFactor = 6.0;
 constexpr int kEscapes = 16;
 constexpr double kRounding = 1e-6;  ///< of the diagonal: start of rays, and distances that are rounding
-constexpr double kParallel = 0.75;  ///< cosine from which on the sides of a wall count as parallel
+constexpr double kParallel = 0.9;   ///< cosine from which on the sides of a wall count as parallel
 /// Voxel size at wide walls and gaps.
 constexpr double kWide = std::numeric_limits<double>::infinity();
+
+struct Sample {
+  std::uint32_t triangle;
+  double u, v;  ///< of the triangle's second and third corner
+};
+
+/// Points that are evenly distributed over the area of triangles.
+class Samples {
+ public:
+  Samples(const PolygonMesh& mesh, const std::vector<Triangle>& triangles) {
+    area_before_.push_back(0.0);
+    for (const Triangle& t : triangles) {
+      const Facet facet(mesh.points[t[0]].cast<double>(), mesh.points[t[1]].cast<double>(),
+                        mesh.points[t[2]].cast<double>());
+      area_before_.push_back(area_before_.back() + 0.5 * facet.normal().norm());
+    }
+  }
+  double area() const { return area_before_.back(); }
+
+  /// Returns sample i of n. Requires an area above 0.
+  Sample at(std::size_t i, std::size_t n) const {
+    const double before = area() * (double(i) + 0.5) / double(n);
+    const auto next = std::upper_bound(area_before_.begin(), area_before_.end() - 1, before);
+    // Additive recurrences by the plastic number, folded over the diagonal of a square.
+    const double u = std::fmod(0.7548776662466927 * double(i), 1.0),
+                 v = std::fmod(0.5698402909980532 * double(i), 1.0);
+    const bool is_beyond = u + v > 1.0;
+    return {std::uint32_t(next - area_before_.begin() - 1), is_beyond ? 1.0 - u : u, is_beyond ? 1.0 - v : v};
+  }
+
+ private:
+  std::vector<double> area_before_;  ///< the sum over the triangles before each one, and over all
+};
 
 /// Measures walls and gaps at points of polygons; lengths in units of the largest voxels.
 class WidthMeter {
@@ -36,17 +73,26 @@ class WidthMeter {
 
   /// Returns the largest voxels that show the wall and the gap at a point of a triangle; infinity if they are
   /// wide, and 0 if the point is not visible.
-  double voxel_at(std::uint32_t triangle, double u, double v) const {
-    const Facet facet = facet_of(triangle);
-    const Vector3d normal = turn(triangle) * facet.normal().stableNormalized();
-    const Vector3d at =
-        facet.corner[0] + u * (facet.corner[1] - facet.corner[0]) + v * (facet.corner[2] - facet.corner[0]);
+  double voxel_at(const Sample& sample) const {
+    const auto [at, normal] = place_of(sample);
     if (!is_visible(at, normal) && !is_visible(at, -normal)) return 0.0;
     // The wall is behind a polygon with its outside in front; a wrong orientation exchanges wall and gap.
     return std::min(width(at, -normal, 1.0) / (2.0 * kShellRadius), width(at, normal, -1.0));
   }
 
+  /// Returns true if a point is visible from both sides.
+  bool is_open_at(const Sample& sample) const {
+    const auto [at, normal] = place_of(sample);
+    return is_visible(at, normal) && is_visible(at, -normal);
+  }
+
  private:
+  std::pair<Vector3d, Vector3d> place_of(const Sample& sample) const {
+    const Facet facet = facet_of(sample.triangle);
+    return {facet.corner[0] + sample.u * (facet.corner[1] - facet.corner[0]) +
+                sample.v * (facet.corner[2] - facet.corner[0]),
+            turn(sample.triangle) * facet.normal().stableNormalized()};
+  }
   Facet facet_of(std::uint32_t t) const {
     return {tree_.corner(t, 0), tree_.corner(t, 1), tree_.corner(t, 2)};
   }
@@ -97,41 +143,37 @@ class WidthMeter {
 
 AutoVoxel auto_voxel(const PolygonMesh& mesh, const AutoVoxelLimits& limits, RunContext& context) {
   const Stage stage(context, "measure walls");
-  const std::vector<Triangle> triangles = triangulated(mesh);
-  const double longest = bounds(mesh).size().maxCoeff(), largest = longest / limits.fewest_voxels;
-  std::vector<double> area_before(triangles.size() + 1, 0.0);
-  for (std::size_t t = 0; t < triangles.size(); ++t) {
-    const Facet facet(mesh.points[triangles[t][0]].cast<double>(),
-                      mesh.points[triangles[t][1]].cast<double>(),
-                      mesh.points[triangles[t][2]].cast<double>());
-    area_before[t + 1] = area_before[t] + 0.5 * facet.normal().norm();
-  }
-  const double area = area_before.back();
   AutoVoxel result;
+  const std::vector<Triangle> triangles = triangulated(mesh);
+  const Samples samples(mesh, triangles);
+  const double longest = bounds(mesh).size().maxCoeff(), largest = longest / limits.fewest_voxels,
+               area = samples.area();
   if (!(longest > 0.0) || !std::isfinite(longest) || !std::isfinite(area)) return result;
 
   std::vector<double> voxels(area > 0.0 ? kSamples : 0);
+  std::vector<std::uint8_t> is_open(area > 0.0 ? kSamplesOfOpen : 0);
   if (area > 0.0) {
     const WidthMeter meter(mesh, triangles, largest);
     parallel_blocks(voxels.size(), context, [&](std::size_t i) {
-      const double before = area * (double(i) + 0.5) / double(voxels.size());
-      const auto next = std::upper_bound(area_before.begin(), area_before.end(), before);
-      const auto t = std::min<std::size_t>(std::size_t(next - area_before.begin()) - 1, triangles.size() - 1);
-      // Additive recurrences by the plastic number, folded over the diagonal of a square.
-      double u = std::fmod(0.7548776662466927 * double(i), 1.0),
-             v = std::fmod(0.5698402909980532 * double(i), 1.0);
-      if (u + v > 1.0) u = 1.0 - u, v = 1.0 - v;
-      voxels[i] = meter.voxel_at(std::uint32_t(t), u, v) * largest;
+      voxels[i] = largest * meter.voxel_at(samples.at(i, voxels.size()));
     });
+    parallel_blocks(is_open.size(), context,
+                    [&](std::size_t i) { is_open[i] = meter.is_open_at(samples.at(i, is_open.size())); });
   }
   std::erase(voxels, 0.0);  // points that are not visible
   std::sort(voxels.begin(), voxels.end());
   const auto may_be_thin = std::size_t(limits.share * double(voxels.size()));
-  result.wanted = voxels.empty() ? largest : std::min(largest, voxels[may_be_thin]);
-  const double smallest =
-      std::max(longest / limits.most_voxels, std::sqrt(kPointsOfFace * area / limits.most_points));
-  result.voxel_size = std::max(result.wanted, smallest);
-  result.points = kPointsOfFace * area / (result.voxel_size * result.voxel_size);
+  result.wanted = may_be_thin < voxels.size() ? std::min(largest, voxels[may_be_thin]) : largest;
+
+  const double open_share =
+      double(std::accumulate(is_open.begin(), is_open.end(), 0)) / double(kSamplesOfOpen);
+  const double seconds = kSeconds * (1.0 + (kOpenFactor - 1.0) * open_share), surface = kPointsOfFace * area;
+  result.voxel_size =
+      std::max({result.wanted, longest / limits.most_voxels, std::sqrt(surface * kBytes / limits.most_bytes),
+                std::sqrt(surface * seconds / limits.most_seconds)});
+  const double points = surface / (result.voxel_size * result.voxel_size);
+  result.bytes = kBytes * points;
+  result.seconds = seconds * points;
   const auto thin = std::lower_bound(voxels.begin(), voxels.end(), result.voxel_size) - voxels.begin();
   if (!voxels.empty()) result.thin_share = double(thin) / double(voxels.size());
   return result;

@@ -18,16 +18,14 @@ struct AutoVoxelLimits {
   double share = 0.01;           ///< of the visible surface that may be thickened or filled
   double fewest_voxels = 200.0;  ///< along the longest side
   double most_voxels = 2000.0;   ///< along the longest side
-  /// Largest estimated number of vertices of the uniform mesh. It takes precedence over fewest_voxels.
-  double most_points = 2e6;
+  // Of the estimates below; these take precedence over the fewest voxels.
+  double most_bytes = double(1 << 30), most_seconds = 10.0;
 };
-
-/// Estimated peak memory and, on two cores, time of remesh() per vertex of the uniform mesh.
-inline constexpr double kRemeshBytes = 700.0, kRemeshSeconds = 1e-5;
 
 struct AutoVoxel {
   double voxel_size = 0.0;  ///< world units; 0 for polygons without extent
-  double points = 0.0;      ///< estimated number of vertices of the uniform mesh
+  double bytes = 0.0;       ///< estimated peak memory of remesh()
+  double seconds = 0.0;     ///< estimated time of remesh(), summed over the cores
   /// Share of the visible surface at walls and gaps that are too thin for the voxels.
   double thin_share = 0.0;
   double wanted = 0.0;  ///< voxel size without limits for small voxels, world units

@@ -6,7 +6,9 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
+#include <tuple>
 
+#include "algorithms/search/triangle_tree.h"
 #include "algorithms/voxelization/voxelize_for_tests.h"
 
 namespace hermesh {
@@ -227,6 +229,111 @@ TEST(BoundedRemesh, AFinThatIsShallowerThanTheErrorNeedNotBeShown) {
   EXPECT_GT(made.voxel_size, 2e-3);
 }
 
+/// Expects each point of the mesh and of the polygons outside of the excepted balls to be within the error of
+/// the other; and both distances to be as large as stated at the balls' centres.
+void expect_bound_outside_balls(const PolygonMesh& polygons, const BoundedMesh& made) {
+  const auto distance = [](const PolygonMesh& mesh, const Vector3d& p) {
+    double nearest = HUGE_VAL;
+    for (const Triangle& t : mesh.triangles)
+      nearest = std::min(nearest, squared_distance(p, mesh.world(t[0]), mesh.world(t[1]), mesh.world(t[2])));
+    return std::sqrt(nearest);
+  };
+  const auto is_excepted = [&](const Vector3d& p) {
+    return std::ranges::any_of(
+        made.excepted, [&](const UnmetPlace& ball) { return (p - ball.place).norm() <= ball.radius; });
+  };
+  std::size_t outside = 0;
+  for (const auto& [from, to, bound] : {std::tuple(&polygons, &made.mesh, made.from_surface),
+                                        std::tuple(&made.mesh, &polygons, made.to_surface)}) {
+    EXPECT_LE(bound, made.error);
+    for_each_place(*from, 24, [&, to = to, bound = bound](const Vector3d& p) {
+      if (is_excepted(p)) return;
+      ++outside;
+      EXPECT_LE(distance(*to, p), bound + 1e-6);
+    });
+  }
+  EXPECT_GT(outside, 1000u);
+  for (const UnmetPlace& ball : made.excepted) {
+    EXPECT_GT(ball.radius, 0.0);
+    EXPECT_GT(ball.area, 0.0);
+    EXPECT_GE(std::max(distance(polygons, ball.place), distance(made.mesh, ball.place)),
+              ball.distance - 1e-6);
+  }
+}
+
+TEST(BoundedRemesh, ThinPartsMayBeExceptedWhileTheBoundHoldsElsewhere) {
+  const PolygonMesh polygons = box_with_fin(0.5);
+  EXPECT_NE(explanation(remesh(polygons, {.error = 0.05})).find("--except-thin"), std::string::npos);
+  const BoundedMesh made = remesh(polygons, {.error = 0.05, .except_thin = true});
+  ASSERT_TRUE(made.unmet.empty());
+  ASSERT_FALSE(made.excepted.empty());
+  expect_bound_outside_balls(polygons, made);
+  // Only the fin, from the error above the lid on, is excepted: half its base times its height, on two sides.
+  const double length = std::hypot(1.0, 0.83), fin = length * 0.5;
+  EXPECT_LE(made.excepted_area(), fin);
+  EXPECT_GE(made.excepted_area(), 0.8 * 0.9 * 0.9 * fin);
+  for (const UnmetPlace& ball : made.excepted) {
+    EXPECT_EQ(ball.why, Unmet::thin);
+    EXPECT_GT(ball.place.z(), 1.0);
+    EXPECT_LE(ball.radius, 4.0 * 0.05);
+  }
+}
+
+TEST(BoundedRemesh, AHoleMayBeExcepted) {
+  PolygonMesh open = box(Vector3d(0, 0, 0), Vector3d(1, 1, 1));
+  open_lid(open);
+  const BoundedMesh made = remesh(open, {.error = 0.05, .except_thin = true});
+  ASSERT_TRUE(made.unmet.empty());
+  ASSERT_FALSE(made.excepted.empty());
+  expect_bound_outside_balls(open, made);
+  EXPECT_NEAR(made.excepted_area(), 1.0, 0.2);
+  EXPECT_EQ(made.excepted.front().why, Unmet::hole);
+}
+
+TEST(BoundedRemesh, ExceptionsChangeNothingWhereTheBoundHolds) {
+  const PolygonMesh polygons = box(Vector3d(0.1, -0.2, 0.3), Vector3d(1.1, 0.5, 0.9));
+  const BoundedMesh made = reached(polygons, {.error = 0.02, .except_thin = true});
+  EXPECT_TRUE(made.excepted.empty());
+  EXPECT_EQ(made.mesh, remesh(polygons, {.error = 0.02}).mesh);
+}
+
+TEST(BoundedRemesh, NotesADifferentNumberOfComponents) {
+  // A crumb that is smaller than the error, next to the box, is not shown by voxels that show the box.
+  PolygonMesh both = box(Vector3d(0, 0, 0), Vector3d(1, 1, 1));
+  append(both, box(Vector3d(1.003, 0.513, 0.513), Vector3d(1.008, 0.518, 0.518)));
+  const BoundedMesh made = reached(both, {.error = 0.05});
+  EXPECT_EQ(made.topology.components, 2u);
+  EXPECT_EQ(made.topology.genus, 0);
+  EXPECT_EQ(topology_of(made.mesh.points, made.mesh.triangles).components, 1u);
+  EXPECT_EQ(notes(made).size(), 1u);
+  EXPECT_TRUE(notes(reached(box(Vector3d(0, 0, 0), Vector3d(1, 1, 1)), {.error = 0.05})).empty());
+}
+
+TEST(Topology, CountsComponentsAndHandles) {
+  const auto of = [](const PolygonMesh& mesh) { return topology_of(mesh.points, triangulated(mesh)); };
+  // The sphere is a soup, whose vertices are only joined by their positions.
+  PolygonMesh mesh = sphere(Vector3d(0, 0, 0), 1.0, 8);
+  EXPECT_EQ(of(mesh).components, 1u);
+  EXPECT_EQ(of(mesh).genus, 0);
+  append(mesh, box(Vector3d(3, 3, 3), Vector3d(4, 4, 4)));
+  EXPECT_EQ(of(mesh).components, 2u);
+  EXPECT_EQ(of(mesh).genus, 0);
+  open_lid(mesh);
+  EXPECT_EQ(of(mesh).genus, 0);
+  mesh.triangles.pop_back();
+  EXPECT_EQ(of(mesh).genus, std::nullopt);
+  // A torus of 3 by 3 quads.
+  PolygonMesh torus;
+  for (int i = 0; i < 9; ++i) torus.points.push_back({float(i), 0, 0});
+  for (std::uint32_t i = 0; i < 3; ++i)
+    for (std::uint32_t j = 0; j < 3; ++j) {
+      const auto at = [](std::uint32_t u, std::uint32_t v) { return 3 * (u % 3) + v % 3; };
+      torus.triangles.push_back({at(i, j), at(i + 1, j), at(i + 1, j + 1)});
+      torus.triangles.push_back({at(i, j), at(i + 1, j + 1), at(i, j + 1)});
+    }
+  EXPECT_EQ(of(torus).genus, 1);
+}
+
 TEST(BoundedRemesh, ABudgetIsKept) {
   const PolygonMesh polygons = sphere(Vector3d(0, 0, 0), 1.0, 24);
   RunContext context;
@@ -315,6 +422,21 @@ TEST(BoundedRemesh, SameBytesAtAnyThreadCount) {
   }
   EXPECT_EQ(made[0], made[1]);
   EXPECT_EQ(made[0], made[2]);
+}
+
+TEST(BoundedRemesh, SameExceptionsAtAnyThreadCount) {
+  std::vector<BoundedMesh> made;
+  for (const std::size_t threads : {1u, 3u}) {
+    tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
+    made.push_back(remesh(box_with_fin(0.5), {.error = 0.05, .except_thin = true}));
+  }
+  EXPECT_EQ(made[0].mesh, made[1].mesh);
+  ASSERT_EQ(made[0].excepted.size(), made[1].excepted.size());
+  for (std::size_t i = 0; i < made[0].excepted.size(); ++i) {
+    EXPECT_EQ(made[0].excepted[i].place, made[1].excepted[i].place);
+    EXPECT_EQ(made[0].excepted[i].radius, made[1].excepted[i].radius);
+    EXPECT_EQ(made[0].excepted[i].area, made[1].excepted[i].area);
+  }
 }
 
 }  // namespace bounded_remesh_test

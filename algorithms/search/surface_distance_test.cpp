@@ -4,6 +4,7 @@
 #include <tbb/global_control.h>
 
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <cmath>
 #include <random>
 
@@ -211,6 +212,35 @@ TEST(SurfaceDistance, CanBeCancelled) {
   EXPECT_THROW(SurfaceDistance(soup.points, soup.triangles)
                    .hold(soup.points, Vector3d::Zero(), soup.triangles, 1.0, context),
                Cancelled);
+}
+
+TEST(SurfaceDistance, ListsAllFarPieces) {
+  const Soup from = square(1, 0, 3), to = square(0.5f, 0.1f);
+  RunContext context;
+  const double limit = 0.2;
+  const DistanceFromSurface found =
+      SurfaceDistance(to.points, to.triangles)
+          .hold(from.points, Vector3d::Zero(), from.triangles, limit, context, {}, Wanted::far_pieces);
+  EXPECT_LE(found.upper, limit);
+  // Near is what lies within this distance of the other square, seen from above.
+  const double beside = std::sqrt(limit * limit - 0.01);
+  const double near = 0.25 + 2.0 * 0.5 * beside + M_PI * beside * beside / 4.0;
+  double far = 0.0;
+  for (const FarTriangle& piece : found.far) {
+    far += piece.area;
+    EXPECT_LE(piece.radius, 0.5 * limit);
+  }
+  EXPECT_GE(far, 1.0 - near);
+  EXPECT_LE(far, 1.0 - near + 0.1);
+  for (int x = 0; x <= 50; ++x)
+    for (int y = 0; y <= 50; ++y) {
+      const Vector3d p(x / 50.0, y / 50.0, 0.0);
+      const double distance = std::hypot(std::max(0.0, p.x() - 0.5), std::max(0.0, p.y() - 0.5), 0.1);
+      const bool is_listed = std::ranges::any_of(found.far, [&](const FarTriangle& piece) {
+        return (p - piece.place).norm() <= piece.radius + 1e-9;
+      });
+      EXPECT_TRUE(is_listed || distance <= found.upper) << p.transpose();
+    }
 }
 
 }  // namespace surface_distance_test

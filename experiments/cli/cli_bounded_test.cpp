@@ -55,6 +55,41 @@ TEST_F(CliBoundedTest, AHoleIsRefusedAndNothingIsWritten) {
   EXPECT_PRED2(has, closed.err, "holes");
 }
 
+TEST_F(CliBoundedTest, ThinPartsAreExceptedAndListed) {
+  // A cube with a hair-thin plate on top, which the smallest voxels do not show.
+  write("thin.off",
+        "OFF\n16 12 0\n0 0 0\n1 0 0\n1 1 0\n0 1 0\n0 0 1\n1 0 1\n1 1 1\n0 1 1\n"
+        "0 0.3 1.2\n1 0.3 1.2\n1 0.3001 1.2\n0 0.3001 1.2\n0 0.3 2\n1 0.3 2\n1 0.3001 2\n0 0.3001 2\n"
+        "4 0 3 2 1\n4 4 5 6 7\n4 0 1 5 4\n4 1 2 6 5\n4 2 3 7 6\n4 3 0 4 7\n"
+        "4 8 11 10 9\n4 12 13 14 15\n4 8 9 13 12\n4 9 10 14 13\n4 10 11 15 14\n4 11 8 12 15\n");
+  const Outcome refused = run_to(1, "remesh thin.off out.ply --error 2% --thin drop");
+  EXPECT_PRED2(has, refused.err, "--except-thin");
+  EXPECT_EQ(files().count("out.ply"), 0u);
+  const Json report = json_of("remesh thin.off out.ply --error 2% --thin drop --except-thin --json");
+  EXPECT_EQ(report.at("exit_code"), 0);
+  const Json& exceptions = report.at("result").at("exceptions");
+  ASSERT_FALSE(exceptions.empty());
+  double area = 0.0;
+  for (const Json& ball : exceptions) {
+    EXPECT_NEAR(ball.at("position")[1].get<double>(), 0.3, 0.01);
+    EXPECT_GT(ball.at("position")[2], 1.1);
+    EXPECT_GT(ball.at("radius"), 0.0);
+    EXPECT_GT(ball.at("distance"), report.at("figures").at("error_asked"));
+    EXPECT_EQ(ball.at("reason"), "thin");
+    area += ball.at("area").get<double>();
+  }
+  EXPECT_NEAR(report.at("result").at("excepted_area").get<double>(), area, 1e-9);
+  EXPECT_NEAR(area, 1.6, 0.1);  // both sides of the plate
+  EXPECT_FALSE(report.at("notes").empty());
+  run_to(0, "validate out.ply --require watertight");
+  // Without exceptions, the list is empty.
+  write_cube();
+  EXPECT_TRUE(json_of("remesh cube.off cube.ply --error 1% --except-thin --json")
+                  .at("result")
+                  .at("exceptions")
+                  .empty());
+}
+
 TEST_F(CliBoundedTest, WrongUsageIsSaid) {
   write_cube();
   const std::vector<Words> wrong = {
@@ -66,6 +101,10 @@ TEST_F(CliBoundedTest, WrongUsageIsSaid) {
       {"--error", "1%", "--extractor", "openvdb"},
       {"--error", "1%", "--signs", "unsigned"},
       {"--resolution", "10", "--over-holes"},
+      {"--resolution", "10", "--except-thin"},
+      {"--resolution", "auto", "--error", "1%"},
+      {"--resolution", "auto", "--voxel-size", "0.1"},
+      {"--resolution", "automatic"},
   };
   for (const Words& options : wrong) {
     const Words words = Words("remesh cube.off out.ply") + options;

@@ -59,6 +59,28 @@ TEST_F(CliTest, ListForPeopleNamesTheSame) {
     for (const std::string& name : names(list[kind])) EXPECT_PRED2(has, text.out, name) << name;
 }
 
+TEST_F(CliTest, RemeshChoosesTheVoxelSizeUnlessItIsGiven) {
+  write_cube();
+  const double side = 1.0;
+  const Json report = json_of("remesh cube.off out.ply --json");
+  EXPECT_NEAR(report.at("result").at("voxel_size").get<double>(), side / 200, 1e-9);
+  EXPECT_EQ(report.at("result").at("auto").at("thin_share"), 0.0);
+  EXPECT_GT(report.at("result").at("auto").at("estimated_bytes"), 1e6);
+  run_to(0, "remesh cube.off auto.ply --resolution auto");
+  EXPECT_EQ(read("out.ply"), read("auto.ply"));
+  run_to(2, "voxelize cube.off out.vdb");
+  run_to(2, "voxelize cube.off out.vdb --resolution auto");
+  // A rod that is thinner than the smallest voxels permitted.
+  write("hair.off",
+        "OFF\n8 6 0\n0 0 0\n1 0 0\n1 1e-5 0\n0 1e-5 0\n0 0 1e-5\n1 0 1e-5\n1 1e-5 1e-5\n0 1e-5 1e-5\n"
+        "4 0 3 2 1\n4 4 5 6 7\n4 0 1 5 4\n4 1 2 6 5\n4 2 3 7 6\n4 3 0 4 7\n");
+  const Json hair = json_of("remesh hair.off out.ply --json");
+  EXPECT_NEAR(hair.at("result").at("voxel_size").get<double>(), 1.0 / 2000, 1e-9);
+  EXPECT_GT(hair.at("result").at("auto").at("thin_share"), 0.9);
+  EXPECT_LT(hair.at("result").at("auto").at("wanted_voxel_size"), 1.0 / 2000);
+  EXPECT_FALSE(hair.at("notes").empty());
+}
+
 TEST_F(CliTest, CubeThroughAllStages) {
   write_cube();
   // A resolution of 10 would put samples onto the cube's faces.

@@ -240,20 +240,19 @@ void choose_voxel_size(const PolygonMesh& mesh, VoxelizeArguments& voxelizing, S
   if (!(chosen.voxel_size > 0.0)) return;
   voxelizing.voxel_size = chosen.voxel_size;
   const auto percent = [](double share) { return text(std::round(1e4 * share) / 100.0) + " %"; };
-  const double bytes = kRemeshBytes * chosen.points, seconds = kRemeshSeconds * chosen.points;
+  const auto mebibytes = [](double bytes) { return text(std::ceil(bytes / (1 << 20))) + " MiB"; };
   made(session, "auto",
        {{"thin_share", chosen.thin_share},
         {"wanted_voxel_size", chosen.wanted},
-        {"estimated_bytes", bytes},
-        {"estimated_seconds", seconds}});
-  print_summary(session, "resolution auto: voxels of " + text(chosen.voxel_size) + ", " +
-                             text(std::round(bounds(mesh).size().maxCoeff() / chosen.voxel_size)) +
-                             " along the longest side, about " + text(std::ceil(bytes / (1 << 20))) +
-                             " MiB and " + text(std::ceil(seconds)) +
-                             " s (limits: " + text(limits.most_voxels) + " voxels, " +
-                             text(std::ceil(kRemeshBytes * limits.most_points / (1 << 20))) + " MiB, " +
-                             text(std::ceil(kRemeshSeconds * limits.most_points)) + " s); " +
-                             percent(chosen.thin_share) + " of the visible surface is at thinner parts");
+        {"estimated_bytes", chosen.bytes},
+        {"estimated_seconds", chosen.seconds}});
+  print_summary(session,
+                "resolution auto: voxels of " + text(chosen.voxel_size) + ", " +
+                    text(std::round(bounds(mesh).size().maxCoeff() / chosen.voxel_size)) +
+                    " along the longest side, about " + mebibytes(chosen.bytes) + " and " +
+                    text(std::ceil(chosen.seconds)) + " s of CPU time (limits: " + text(limits.most_voxels) +
+                    " voxels, " + mebibytes(limits.most_bytes) + ", " + text(limits.most_seconds) + " s); " +
+                    percent(chosen.thin_share) + " of the visible surface is at thinner walls and gaps");
   if (chosen.thin_share > limits.share)
     session.context.note(
         "at the limits of --resolution auto, walls and gaps are too thin for the voxels at " +

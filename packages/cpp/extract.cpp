@@ -214,7 +214,8 @@ BoundedRemesh remesh_within(const Mesh& mesh, const BoundOptions& options, Conte
                                      .most_points = options.most_points,
                                      .smallest_voxel = options.smallest_voxel,
                                      .written_in_single = options.written_in_single,
-                                     .thin = options.thin == Thin::keep ? ThinRule::keep : ThinRule::drop};
+                                     .thin = options.thin == Thin::keep ? ThinRule::keep : ThinRule::drop,
+                                     .except_thin = options.except_thin};
     PolygonMesh copy;
     const PolygonMesh& polygons = Inside::sampled(mesh, copy);
     BoundedMesh made = options.triangles ? remesh_to_budget(polygons, *options.triangles, given, inner)
@@ -222,11 +223,19 @@ BoundedRemesh remesh_within(const Mesh& mesh, const BoundOptions& options, Conte
     if (!made.unmet.empty()) throw hermesh::Error(explanation(made));
     for (const std::string& note : notes(made)) inner.note(note);
     if (made.thin) inner.note(thin_note(*made.thin, made.voxel_size));
+    std::vector<ExceptedBall> exceptions;
+    for (const UnmetPlace& ball : made.excepted)
+      exceptions.push_back({.position = {ball.place.x(), ball.place.y(), ball.place.z()},
+                            .radius = ball.radius,
+                            .distance = ball.distance,
+                            .area = ball.area,
+                            .is_hole = ball.why == Unmet::hole});
     return BoundedRemesh{.mesh = Inside::mesh(std::move(made.mesh)),
                          .error = made.error,
                          .to_polygons = made.to_surface,
                          .from_polygons = made.from_surface,
-                         .voxel_size = made.voxel_size};
+                         .voxel_size = made.voxel_size,
+                         .exceptions = std::move(exceptions)};
   });
 }
 

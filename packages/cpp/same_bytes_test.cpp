@@ -89,6 +89,7 @@ TEST_F(AsTheProgram, RemeshesWithinAnError) {
   EXPECT_LE(made.from_polygons, 0.03);
   const hermesh::BoundedRemesh few = hermesh::remesh_within(torus(), {.triangles = 300}, context_);
   EXPECT_LE(few.mesh.triangle_count(), 300u);
+  EXPECT_TRUE(few.exceptions.empty());
   EXPECT_THROW(hermesh::remesh_within(torus(), {}, context_), Error);
   EXPECT_THROW(hermesh::remesh_within(torus(), {.error = 0.1, .triangles = 10}, context_), Error);
   EXPECT_THROW(hermesh::remesh_within(torus(), {.error = 0.1, .signs = "unsigned"}, context_), Error);

@@ -513,24 +513,29 @@ void bind_functions(py::module_& m) {
           });
         });
   m.def("remesh", watching<const Mesh&, const VoxelizeOptions&, const ExtractOptions&>(&remesh));
-  m.def("remesh_within",
-        [](const Mesh& mesh, std::optional<double> error, std::optional<std::size_t> triangles,
-           const std::string& signs, bool over_holes, double smallest_voxel, double limit_points,
-           bool written_in_single, Thin thin, Watch& watch) {
-          const BoundedRemesh made = watched(watch, [&](Context& context) {
-            return remesh_within(mesh,
-                                 {.error = error,
-                                  .triangles = triangles,
-                                  .signs = signs,
-                                  .over_holes = over_holes,
-                                  .smallest_voxel = smallest_voxel,
-                                  .most_points = limit_points,
-                                  .written_in_single = written_in_single,
-                                  .thin = thin},
-                                 context);
-          });
-          return py::make_tuple(made.mesh, made.error, made.to_polygons, made.from_polygons, made.voxel_size);
-        });
+  m.def("remesh_within", [](const Mesh& mesh, std::optional<double> error,
+                            std::optional<std::size_t> triangles, const std::string& signs, bool over_holes,
+                            double smallest_voxel, double limit_points, bool written_in_single, Thin thin,
+                            bool except_thin, Watch& watch) {
+    const BoundedRemesh made = watched(watch, [&](Context& context) {
+      return remesh_within(mesh,
+                           {.error = error,
+                            .triangles = triangles,
+                            .signs = signs,
+                            .over_holes = over_holes,
+                            .smallest_voxel = smallest_voxel,
+                            .most_points = limit_points,
+                            .written_in_single = written_in_single,
+                            .thin = thin,
+                            .except_thin = except_thin},
+                           context);
+    });
+    py::list exceptions;
+    for (const ExceptedBall& ball : made.exceptions)
+      exceptions.append(py::make_tuple(ball.position, ball.radius, ball.distance, ball.area, ball.is_hole));
+    return py::make_tuple(made.mesh, made.error, made.to_polygons, made.from_polygons, made.voxel_size,
+                          exceptions);
+  });
   m.def("combine", [](const std::string& operation, const Mesh& a, const Mesh& b,
                       const VoxelizeOptions& voxelizing, const ExtractOptions& extracting, Watch& watch) {
     const Boolean boolean = boolean_of(operation);

@@ -39,8 +39,8 @@ from ._core import (Cancelled, Error, Fracture, Frustum, Mesh, MethodInfo, Optio
 
 __version__: str = _core.version()
 __all__ = [
-    "BoundedRemesh", "Cancelled", "Error", "Fracture", "Frustum", "Log", "Mesh", "MethodInfo", "Note",
-    "OptionInfo", "Piece", "Volume", "as_mesh", "combine", "extract", "extractors", "fracture",
+    "BoundedRemesh", "Cancelled", "Error", "ExceptedBall", "Fracture", "Frustum", "Log", "Mesh", "MethodInfo",
+    "Note", "OptionInfo", "Piece", "Volume", "as_mesh", "combine", "extract", "extractors", "fracture",
     "from_pyopenvdb", "grid_names", "import_volume", "read_mesh", "read_vdb", "remesh", "remesh_within",
     "to_meshio", "to_pyopenvdb", "to_trimesh", "validate", "validate_fracture", "voxelize", "voxelize_grids",
     "voxelizers", "write_mesh", "write_vdb"
@@ -420,6 +420,15 @@ def remesh(mesh: MeshLike, *, resolution: int | None = None, voxel_size: float |
         return _core.remesh(mesh, voxelizing, extracting, watch)
 
 
+class ExceptedBall(NamedTuple):
+    """A ball within which a bound may not hold, world units."""
+    position: list[float]
+    radius: float
+    distance: float  # lower bound of the distance between mesh and polygons at the position
+    area: float  # of the parts of polygons and mesh in the ball that are not shown to be near
+    is_hole: bool  # the mesh closes a hole there; otherwise a wall or gap is too thin
+
+
 class BoundedRemesh(NamedTuple):
     """A mesh with its certified distances, world units."""
     mesh: Mesh
@@ -427,13 +436,14 @@ class BoundedRemesh(NamedTuple):
     to_polygons: float  # bound of the distance from the mesh to the boundary of the polygons' solid
     from_polygons: float  # bound of the distance from that boundary to the mesh
     voxel_size: float
+    exceptions: list[ExceptedBall]  # with except_thin, balls outside of which the bounds hold
 
 
 def remesh_within(mesh: MeshLike, *, error: float | None = None, triangles: int | None = None,
                   signs: str = "winding-number", over_holes: bool = False, smallest_voxel: float = 0.0,
                   limit_points: float = 3e7, written_in_single: bool = False, thin: str = "keep",
-                  progress: Progress | None = None, cancel: _IsSet | None = None, threads: int | None = None,
-                  log: Log | None = None) -> BoundedRemesh:
+                  except_thin: bool = False, progress: Progress | None = None, cancel: _IsSet | None = None,
+                  threads: int | None = None, log: Log | None = None) -> BoundedRemesh:
     """Returns a mesh with a certified two-sided distance of at most `error` (world units) to the boundary of
     the polygons' solid, or with at most `triangles` and the smallest certified error found. Closed, manifold
     and free of self-intersection.
@@ -441,11 +451,15 @@ def remesh_within(mesh: MeshLike, *, error: float | None = None, triangles: int 
     over_holes allows it to close holes where no polygon is near. smallest_voxel (world units, 0 for an eighth
     of the error) and limit_points limit the work; beyond them the function raises hermesh.Error with location
     and reason. thin is as in remesh(); with "drop" and "refuse" a part that is too thin is an error.
+    except_thin lets the bound hold except in the balls of `exceptions`, around such parts and holes, with a
+    note, instead of raising an error.
     """
     mesh = as_mesh(mesh)
     with _Watching(progress, cancel, threads, log) as watch:
-        return BoundedRemesh(*_core.remesh_within(mesh, error, triangles, signs, over_holes, smallest_voxel,
-                                                  limit_points, written_in_single, _thin(thin), watch))
+        *made, exceptions = _core.remesh_within(mesh, error, triangles, signs, over_holes, smallest_voxel,
+                                                limit_points, written_in_single, _thin(thin), except_thin,
+                                                watch)
+    return BoundedRemesh(*made, [ExceptedBall(*ball) for ball in exceptions])
 
 
 def combine(operation: str, a: MeshLike, b: MeshLike, *, resolution: int | None = None,

@@ -60,6 +60,21 @@ class SameBytes(unittest.TestCase):
         with self.assertRaises(hermesh.Error):
             hermesh.remesh_within(self.torus)
 
+    def test_of_exceptions(self):
+        plate = self.folder / "hair.ply"
+        points, quads = cube(1.0)
+        hermesh.write_mesh(plate, (np.vstack([points, points * [1, 1, 0.0001] + [0, 0, 1.3]]),
+                                   np.vstack([quads, quads + 8])))
+        with self.assertRaises(hermesh.Error):
+            hermesh.remesh_within(plate, error=0.05, thin="drop")
+        with self.assertWarns(hermesh.Note):
+            made = hermesh.remesh_within(plate, error=0.05, thin="drop", except_thin=True)
+        self.compare(made.mesh, ".ply", "remesh", plate, "--error", 0.05, "--thin", "drop", "--except-thin")
+        self.assertTrue(made.exceptions)
+        for ball in made.exceptions:
+            self.assertGreater(ball.distance, 0.05)
+            self.assertFalse(ball.is_hole)
+
     def test_of_thin_parts(self):
         plate = self.folder / "plate.ply"
         points, quads = cube(1.0)

@@ -78,6 +78,18 @@ struct BoundOptions {
   double most_points = 3e7;              ///< maximum number of vertices of the finest mesh
   bool written_in_single = false;        ///< as in ExtractOptions
   Thin thin = Thin::keep;  ///< otherwise a part that the smallest voxels do not show is an error
+  /// True if the bound need not hold around holes, walls and gaps that no voxel size shows; otherwise these
+  /// are an error.
+  bool except_thin = false;
+};
+
+/// A ball within which a bound may not hold, world units.
+struct ExceptedBall {
+  std::array<double, 3> position = {0, 0, 0};
+  double radius = 0.0;
+  double distance = 0.0;  ///< lower bound of the distance between mesh and polygons at the position
+  double area = 0.0;      ///< of the parts of polygons and mesh in the ball that are not shown to be near
+  bool is_hole = false;   ///< true if the mesh closes a hole there; otherwise a wall or gap is too thin
 };
 
 /// A mesh with its certified distances, world units.
@@ -87,6 +99,8 @@ struct BoundedRemesh {
   double to_polygons = 0.0;    ///< bound of the distance from the mesh to the boundary of the polygons' solid
   double from_polygons = 0.0;  ///< bound of the distance from that boundary to the mesh
   double voxel_size = 0.0;
+  /// With `except_thin`, balls outside of which the bounds hold, those with the largest distance first.
+  std::vector<ExceptedBall> exceptions = {};
 };
 
 /// Returns a closed, manifold mesh free of self-intersection with few triangles and a certified distance from
