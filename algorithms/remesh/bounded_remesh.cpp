@@ -672,7 +672,7 @@ std::vector<std::string> notes(const BoundedMesh& made) {
                      counted(before.components, "connected part") + ": " +
                      (after.components > before.components
                           ? "thin walls came apart or gaps were closed within the error"
-                          : "parts that touch, intersect or are within the error of each other were joined"));
+                          : "parts were lost, or joined to others that they touch or nearly touch"));
   if (before.genus && after.genus != before.genus)
     result.push_back("the mesh has the genus " + std::to_string(*after.genus) +
                      " and the polygons that bound the solid have " + std::to_string(*before.genus) +

@@ -61,7 +61,7 @@ TEST_F(CliTest, ListForPeopleNamesTheSame) {
 
 TEST_F(CliTest, RemeshChoosesTheVoxelSizeUnlessItIsGiven) {
   write_cube();
-  const double side = 1.0;
+  const double side = 2.0;
   const Json report = json_of("remesh cube.off out.ply --json");
   EXPECT_NEAR(report.at("result").at("voxel_size").get<double>(), side / 200, 1e-9);
   EXPECT_EQ(report.at("result").at("auto").at("thin_share"), 0.0);
