@@ -3,10 +3,10 @@
 // **The rule.** A wall is thickened if it is thinner than 1.2 voxels (2 kShellRadius), and a gap is filled if
 // it is thinner than a voxel. At each of 10,000 points, evenly distributed over the polygons' area, the wall
 // behind the polygon and the gap in front of it are measured along its normal, as in thin_parts.h: up to the
-// next polygon, if that is roughly parallel and faces away from the point, or faces it. Points that no ray
-// leaves the polygons from are not visible and do not count. The voxel size is the largest for which at most
-// the given share of the visible points is at a wall or gap that is too thin, within limits. Open surfaces
-// have no thickness that smaller voxels could show.
+// next polygon, if that is roughly parallel and its outside faces away from the point, or towards it. A point
+// is visible if two of 16 rays from one of its sides leave the polygons; other points do not count. The voxel
+// size is the largest for which at most the given share of the visible points is at a wall or gap that is too
+// thin, within limits. Open surfaces have no thickness that smaller voxels could show.
 #pragma once
 
 #include "algorithms/core/polygon_mesh.h"
@@ -28,7 +28,7 @@ struct AutoVoxel {
   double seconds = 0.0;     ///< estimated time of remesh(), summed over the cores
   /// Share of the visible surface at walls and gaps that are too thin for the voxels.
   double thin_share = 0.0;
-  double wanted = 0.0;  ///< voxel size without limits for small voxels, world units
+  double wanted = 0.0;  ///< voxel size that the share requires, without the other limits; world units
 };
 
 /// Returns the voxel size of the rule above. The same for every number of threads. @throws Cancelled

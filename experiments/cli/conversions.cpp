@@ -85,9 +85,9 @@ CLI::App* add_voxelize_options(CLI::App& command, VoxelizeArguments& arguments, 
   const CLI::Validator number = whole_number(1, std::int64_t(1) << 40);
   size->add_option("--resolution", arguments.resolution,
                    with_auto
-                       ? "Voxels along the longest side of the mesh, or auto (default): from 200 to 2000, "
-                         "so many that at most 1 % of the visible surface is at walls and gaps too thin "
-                         "for them, within limits of memory and time that are printed"
+                       ? "Voxels along the longest side of the mesh, or auto (default), which chooses 200 to "
+                         "2000 such that at most 1 % of the visible surface is at walls and gaps that are "
+                         "too thin for them, within printed limits of memory and time"
                        : "Voxels along the longest side of the mesh")
       ->transform(with_auto ? CLI::Validator(
                                   [number](std::string& given) {
