@@ -164,7 +164,7 @@ class BoundedRemesher {
       if (!made) continue;
       const SurfaceDistance surface(made->surface->points, made->surface->triangles);
       const SurfaceDistance uniform(made->file_points, made->fine.triangles());
-      const std::vector<Far> far = compare(*made, surface, uniform, Wanted::far_pieces).far;
+      const std::vector<Far> far = compare(*made, surface, uniform, true).far;
       const double excepted = std::transform_reduce(far.begin(), far.end(), 0.0, std::plus<>(),
                                                     [](const Far& piece) { return piece.area; });
       if (!is_last && excepted > 0.0 && excepted < kWorthFiner * std::exchange(before, excepted)) continue;
@@ -438,13 +438,13 @@ class BoundedRemesher {
   /// Returns positions where the uniform mesh and the surface are farther apart than the error.
   std::vector<Far> far_between_points(const Attempt& now, const SurfaceDistance& surface,
                                       const SurfaceDistance& uniform) const {
-    return compare(now, surface, uniform, Wanted::any_bound).far;
+    return compare(now, surface, uniform, false).far;
   }
   TwoSidedDistance compare(const Attempt& now, const SurfaceDistance& surface, const SurfaceDistance& uniform,
-                           Wanted wanted) const {
+                           bool lists_pieces) const {
     const Stage stage(context_, "compare between points");
     return proof_.compare(now.file_points, now.fine.triangles(), now.offset, *now.surface, surface, uniform,
-                          wanted, context_);
+                          Wanted::any_bound, lists_pieces, context_);
   }
 
   /// Collapses with the rest of the error, again as long as that is worth it. Returns the positions where the
@@ -519,8 +519,8 @@ class BoundedRemesher {
     const Stage stage(context_, "prove");
     const std::vector<Eigen::Vector3f> points = now.in_file(coarse.points);
     TwoSidedDistance proved = proof_.compare(points, coarse.triangles, now.offset, *now.surface, surface,
-                                             SurfaceDistance(points, coarse.triangles),
-                                             excepted_ ? Wanted::far_pieces : Wanted::small_bound, context_);
+                                             SurfaceDistance(points, coarse.triangles), Wanted::small_bound,
+                                             excepted_.has_value(), context_);
     result_.to_surface = proved.to_surface;
     result_.from_surface = proved.from_surface;
     result_.free_area = proved.free_area;

@@ -72,7 +72,7 @@ bool TwoSidedProof::bounds_nothing(const SolidSurface& surface, const Far& at) c
 TwoSidedDistance TwoSidedProof::compare(std::span<const Eigen::Vector3f> points,
                                         const std::vector<Triangle>& triangles, const Eigen::Vector3d& offset,
                                         const SolidSurface& surface, const SurfaceDistance& to,
-                                        const SurfaceDistance& from, Wanted wanted,
+                                        const SurfaceDistance& from, Wanted wanted, bool lists_pieces,
                                         const RunContext& context) const {
   FreePieces free;
   if (winding_)
@@ -81,9 +81,10 @@ TwoSidedDistance TwoSidedProof::compare(std::span<const Eigen::Vector3f> points,
   const auto hold = [&](const SurfaceDistance& other, std::span<const Eigen::Vector3f> of,
                         const Eigen::Vector3d& shift, const std::vector<Triangle>& held,
                         const FreePieces& may_be_free) {
-    return wanted == Wanted::any_bound
-               ? other.hold(of, shift, held, error_, context, may_be_free, Wanted::any_bound)
-               : smallest_bound(other, of, shift, held, may_be_free, wanted, context);
+    return wanted == Wanted::small_bound
+               ? smallest_bound(other, of, shift, held, may_be_free, lists_pieces, context)
+               : other.hold(of, shift, held, error_, context, may_be_free,
+                            lists_pieces ? Wanted::far_pieces : wanted);
   };
   const DistanceFromSurface there = hold(to, points, offset, triangles, {}),
                             back = hold(from, surface.points, -offset, surface.triangles, free);
@@ -101,7 +102,7 @@ DistanceFromSurface TwoSidedProof::smallest_bound(const SurfaceDistance& to,
                                                   std::span<const Eigen::Vector3f> points,
                                                   const Eigen::Vector3d& offset,
                                                   std::vector<Triangle> triangles, const FreePieces& free,
-                                                  Wanted wanted, const RunContext& context) const {
+                                                  bool lists_pieces, const RunContext& context) const {
   DistanceFromSurface all;
   std::vector<std::uint32_t> numbers(triangles.size());
   std::iota(numbers.begin(), numbers.end(), 0u);
@@ -109,8 +110,9 @@ DistanceFromSurface TwoSidedProof::smallest_bound(const SurfaceDistance& to,
     const bool is_last = limit >= error_;
     if (is_last) limit = error_;
     // Before the last limit nothing is free, because a far piece may still be near enough.
-    DistanceFromSurface now = to.hold(points, offset, triangles, limit, context,
-                                      is_last ? free : FreePieces{}, is_last ? wanted : Wanted::small_bound);
+    DistanceFromSurface now =
+        to.hold(points, offset, triangles, limit, context, is_last ? free : FreePieces{},
+                is_last && lists_pieces ? Wanted::far_pieces : Wanted::small_bound);
     all.upper = std::max(all.upper, now.upper);
     all.free_area += now.free_area;
     // Only triangles beyond this limit are compared with the next.

@@ -68,19 +68,21 @@ class TwoSidedProof {
 
   /// Compares a mesh with the surface. `points` are relative to a position that is `offset` from the
   /// polygons' origin; `to` and `from` measure the distances to the surface and to the mesh. With
-  /// Wanted::any_bound the bounds are at most the error; otherwise they are minimal, to a few hundredths of
-  /// it. With Wanted::far_pieces they hold for all points outside of the balls around the pieces in `far`.
+  /// Wanted::small_bound the bounds are minimal, to a few hundredths of the error; otherwise they are at most
+  /// the error. If `lists_pieces`, `far` has pieces (Wanted::far_pieces), and the bounds hold for all points
+  /// outside of the balls around these.
   /// @throws Cancelled
   TwoSidedDistance compare(std::span<const Eigen::Vector3f> points, const std::vector<Triangle>& triangles,
                            const Eigen::Vector3d& offset, const SolidSurface& surface,
                            const SurfaceDistance& to, const SurfaceDistance& from, Wanted wanted,
-                           const RunContext& context) const;
+                           bool lists_pieces, const RunContext& context) const;
 
  private:
   bool bounds_nothing(const std::array<Eigen::Vector3d, 3>& piece) const;
   DistanceFromSurface smallest_bound(const SurfaceDistance& to, std::span<const Eigen::Vector3f> points,
                                      const Eigen::Vector3d& offset, std::vector<Triangle> triangles,
-                                     const FreePieces& free, Wanted wanted, const RunContext& context) const;
+                                     const FreePieces& free, bool lists_pieces,
+                                     const RunContext& context) const;
 
   const double error_, rounding_;  ///< world units
   const bool keeps_open_;
