@@ -105,7 +105,8 @@ class SurfaceDistance::Walk {
       }
       if (!is_far && found.triangle != piece.nearest && all_near(piece.corners, found.triangle, upper))
         continue;
-      if (is_far || !cut_along(piece.corners, found.triangle)) halve(piece.corners, found.triangle);
+      // Pieces that straddle the limit would be cut into more and more slivers.
+      if (is_far || lists || !cut_along(piece.corners, found.triangle)) halve(piece.corners, found.triangle);
     }
   }
 
