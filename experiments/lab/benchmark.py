@@ -25,6 +25,7 @@ memory_mib  limit of address space per run
                      {resolution}, {voxel} (or {error}, in the units of the file), {seed} and {threads} are
                      replaced; `claims` has what it claims of each mesh, e.g.
                      {watertight = true, distance_to_input = "{error}"}
+            `tier = "full"` leaves the method out of the tier quick, unless --method names it
 
 Each run is a process of its own. Its row is on disk when it ends, and the same command continues after an
 interruption. Meshes are validated with `hermesh validate`, which shares no code with the methods.
@@ -75,8 +76,10 @@ def read_experiment(path):
     if difference := (REQUIRED - experiment.keys()) | (experiment.keys() - REQUIRED - OPTIONAL):
         raise LabError(f"{path}: unknown or missing keys: {', '.join(sorted(difference))}")
     allowed = {"name", "request"}, {"name", "request", "claims"}, {"name", "adapter"}
-    if any(method.keys() not in allowed for method in experiment["method"]):
+    if any(method.keys() - {"tier"} not in allowed for method in experiment["method"]):
         raise LabError(f"{path}: a [[method]] has a name, and an adapter or a request with optional claims")
+    if any(method.get("tier", "full") != "full" for method in experiment["method"]):
+        raise LabError(f"{path}: the tier of a [[method]] must be \"full\" or absent")
     if (task := experiment.get("task", "remesh")) not in protocol.TASKS:
         raise LabError(f"{path}: unknown task '{task}'; expected {', '.join(protocol.TASKS)}")
     if task == "simplify" and "error" not in experiment:
@@ -393,7 +396,7 @@ def add_command(subparsers):
                         help="also run this program with the first method's arguments, e.g. another version")
     parser.add_argument("--method", action="append", help="run only this method; may be repeated")
     parser.add_argument("--tier", choices=["quick", "full"], default="quick",
-                        help="number of models that the experiment specifies for this tier (default: quick)")
+                        help="models and methods that the experiment specifies for this tier (default: quick)")
     parser.add_argument("--models", type=int, help="number of models instead of the experiment's")
     parser.add_argument("--sample", choices=["random", "listed"],
                         help="kind of sample instead of the experiment's")
@@ -433,6 +436,14 @@ def _parse_shard(text):
     return number, count
 
 
+def select_methods(methods, tier, names=None):
+    """Returns the methods with these names or, without names, those of a tier."""
+    if unknown := set(names or []) - {method["name"] for method in methods}:
+        raise LabError(f"unknown method {', '.join(sorted(unknown))}; expected "
+                       f"{', '.join(method['name'] for method in methods)}")
+    return [m for m in methods if (m["name"] in names if names else tier in ("full", m.get("tier", "quick")))]
+
+
 def run(arguments):
     say, cache = functools.partial(print, file=sys.stderr, flush=True), corpus.cache_directory()
     if arguments.compare:
@@ -456,11 +467,7 @@ def run(arguments):
                            "method with a request first")
         request = [path if word == "{hermesh}" else word for word in first["request"]]
         experiment["method"].append({**first, "name": name, "request": request})
-    if arguments.method:
-        known = [method["name"] for method in experiment["method"]]
-        if unknown := set(arguments.method) - set(known):
-            raise LabError(f"{file}: unknown method {', '.join(unknown)}; expected {', '.join(known)}")
-        experiment["method"] = [m for m in experiment["method"] if m["name"] in arguments.method]
+    experiment["method"] = select_methods(experiment["method"], arguments.tier, arguments.method)
     models = experiment["models"]
     models = arguments.models or (models[arguments.tier] if isinstance(models, dict) else models)
     classes = experiment.get("classes", rates.CLASSES)

@@ -194,6 +194,18 @@ class Experiments(unittest.TestCase):
         for file in (ROOT / "experiments/lab/questions").glob("*.toml"):
             self.assertIn("method", benchmark.read_experiment(file))
 
+    def test_the_quick_tier_of_wild_has_one_method_of_six_programs(self):
+        methods = benchmark.read_experiment(ROOT / "experiments/lab/questions/wild.toml")["method"]
+
+        def names(*arguments):
+            return {method["name"] for method in benchmark.select_methods(methods, *arguments)}
+        self.assertEqual(names("quick"), {"hermesh", "OpenVDB", "CGAL alpha wrap", "VTK flying edges",
+                                          "meshoptimizer remesh", "Manifold simplify"})
+        self.assertEqual(names("full"), {method["name"] for method in methods})
+        self.assertEqual(names("quick", ["Blender, voxels", "OpenVDB"]), {"Blender, voxels", "OpenVDB"})
+        with self.assertRaises(LabError):
+            names("full", ["absent"])
+
     def test_methods(self):
         numbers = "".join(f"{key} = 1\n" for key in ("models", "seed", "resolution", "seconds", "memory_mib"))
         head = f'question = ""\ncorpus = ""\n{numbers}[[method]]\nname = "a"\n'
@@ -201,6 +213,8 @@ class Experiments(unittest.TestCase):
             file = pathlib.Path(work) / "a.toml"
             for method, is_right in (('request = ["a"]', True), ('adapter = ["a"]', True), ("", False),
                                      ('request = ["a"]\nclaims = {watertight = true}', True),
+                                     ('request = ["a"]\ntier = "full"', True),
+                                     ('request = ["a"]\ntier = "quick"', False),
                                      ('request = ["a"]\nadapter = ["a"]', False),
                                      ('adapter = ["a"]\nclaims = {watertight = true}', False)):
                 file.write_text(head + method)
