@@ -277,6 +277,22 @@ class Solids(unittest.TestCase):
                 file.write_text(text)
             self.cube, self.shifted = (polygons.read(file)[0] for file in files)
 
+    def test_misplaced_volume_of_pieces(self):
+        cube = polygons.solid(self.cube)
+        left = cube * [0.5, 1, 1]
+        halves = [left, left + [1, 0, 0]]
+        middle, quarter = numpy.array([[1.0, 0, 0, 1]]), numpy.array([[1.0, 0, 0, 0.5]])
+        for pieces, planes, expected in (
+                (halves, middle, 0), ([cube], middle, 0.5), ([cube], quarter, 0.25), (halves, quarter, 0.25),
+                (halves, numpy.array([[0.0, 0, 1, 0.5]]), 0.25), ([left], middle, 0.5),
+                (2 * halves, middle, 1), ([cube + [0, 0, 1]], numpy.array([[0.0, 0, 1, -1]]), 1)):
+            self.assertAlmostEqual(polygons.misplaced_share(cube, pieces, planes), expected, delta=0.05)
+        planes = polygons.random_planes(cube, 5, 1)
+        numpy.testing.assert_allclose(numpy.linalg.norm(planes[:, :3], axis=1), 1)
+        sides = cube.reshape(-1, 3) @ planes[:, :3].T - planes[:, 3]
+        self.assertTrue(((sides.min(axis=0) < 0) & (sides.max(axis=0) > 0)).all())
+        numpy.testing.assert_array_equal(planes, polygons.random_planes(cube, 5, 1))
+
     def test_wrong_volume(self):
         self.assertAlmostEqual(abs(polygons.volume(self.shifted)), 8)
         common = 1.9 * 2 * 2
@@ -494,8 +510,25 @@ end(claims=dict(watertight=True))"""
         rates.write_report(rows, ["hermesh", "copy"], {"hermesh"}, "Why?", self.work / "out", "combine")
         self.assertIn("of the volume wrong", (self.work / "out/gallery.html").read_text())
 
-    def test_claims_of_requests(self):
+    def test_fractures(self):
+        mkdir = "os.mkdir(request['output']); request['output'] += '/1.ply'; "
+        right = {"name": "hermesh", "claims": {"watertight": True},
+                 "request": ["{hermesh}", "fracture", "{input}", "{output}", "--cutters", "planes:{planes}",
+                             "--voxel-size", "{voxel}", "--no-picture"]}
+        rows = self.run_methods([right, self.adapter("whole", f"{mkdir}write(CUBE); end()"),
+                                 self.adapter("open", f"{mkdir}write(CUBE, 11); end(claims=dict("
+                                              "watertight=True))"),
+                                 self.adapter("none", "end()")], task="fracture", resolution=50)
+        self.assertEqual([row["status"] for row in rows], ["done", "done", "done", "wrong output"])
+        self.assertEqual([row["near"] for row in rates.counted(rows)], [True, False, False, False])
+        self.assertEqual(rows[2]["failed_claims"], ["watertight"])
+        self.assertGreater(rows[0]["pieces"], 2)
+        self.assertLess(rows[1]["volume_error"], 1e-6)  # only the planes reveal that it is not cut
+        self.assertAlmostEqual(rows[0]["volume"], 8, delta=0.08)
+        rates.write_report(rows, ["hermesh", "whole"], {"hermesh"}, "Why?", self.work / "out", "fracture")
+        self.assertIn("of the volume wrong", (self.work / "out/gallery.html").read_text())
 
+    def test_claims_of_requests(self):
         request = ["{hermesh}", "remesh", "{input}", "{output}", "--voxel-size", "{voxel}"]
         claims = {"watertight": True, "distance_to_input": "{voxel}"}
         row, = self.run_methods([{"name": "remesh", "request": request, "claims": claims}])
