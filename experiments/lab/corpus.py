@@ -165,14 +165,14 @@ def fetch(entries, cache, say):
     Raises LabError if a package cannot be downloaded, or a file differs from the corpus.
     """
     missing = [e for e in entries if not location(e, cache).exists()]
-    packages = sorted({e.package for e in missing})
-    if packages:
-        total = sum(map(_package_bytes, packages)) / 2**20
-        say(f"{len(missing)} models are in {len(packages)} packages: {total:.0f} MiB to download")
-    for package in packages:
+    sizes = {package: _package_bytes(package) / 2**20 for package in sorted({e.package for e in missing})}
+    if sizes:
+        say(f"{len(missing)} models are in {len(sizes)} packages: {sum(sizes.values()):.0f} MiB to download")
+    for package, size in sizes.items():
+        say(f"downloading {package}, {size:.0f} MiB")
         wanted = [e for e in missing if e.package == package]
         with tempfile.TemporaryDirectory() as work:
-            _unpack(_download(package, work, say), wanted, cache, work)
+            _unpack(_download(package, work), wanted, cache, work)
 
 
 def _package_bytes(package):
@@ -184,8 +184,7 @@ def _package_bytes(package):
     return next((int(line.split()[1]) for line in shown.stdout.splitlines() if line.startswith("Size:")), 0)
 
 
-def _download(package, work, say):
-    say(f"downloading {package}, {_package_bytes(package) / 2**20:.0f} MiB")
+def _download(package, work):
     try:
         got = subprocess.run(["apt-get", "download", package], cwd=work, capture_output=True, text=True)
     except FileNotFoundError:

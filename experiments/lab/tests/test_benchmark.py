@@ -189,6 +189,17 @@ class Rates(unittest.TestCase):
                 rates.differences(folders[0], work)
 
 
+class Corpus(unittest.TestCase):
+    def test_the_size_of_a_package_is_asked_for_once(self):
+        entries, said = [corpus.Entry("p", "1", f, f"{i}" * 64, "off", 1, "none") for i, f in enumerate("ab")], []
+        with mock.patch.object(corpus, "_package_bytes", return_value=3 * 2**20) as size, \
+                mock.patch.object(corpus, "_download"), mock.patch.object(corpus, "_unpack") as unpack:
+            corpus.fetch(entries, pathlib.Path("absent"), said.append)
+        size.assert_called_once_with("p")
+        unpack.assert_called_once()
+        self.assertEqual(said, ["2 models are in 1 packages: 3 MiB to download", "downloading p, 3 MiB"])
+
+
 class Experiments(unittest.TestCase):
     def test_files_of_the_project(self):
         for file in (ROOT / "experiments/lab/questions").glob("*.toml"):
