@@ -375,7 +375,7 @@ class Benchmark:
         return row, files
 
     def _draw(self, model, path, row, outputs):
-        """Writes pictures of a model and of an output for the gallery, unless they are of other formats."""
+        """Writes pictures of a model and of an output for the gallery, unless they cannot be read."""
         folder = self.out / "pictures"
         folder.mkdir(exist_ok=True)
         for sources, name in (([path], rates.picture_name(row["sha256"])),
@@ -500,7 +500,7 @@ def run(arguments):
     entries = [e for e in corpus.read_corpus(ROOT / "experiments/data" / experiment["corpus"])
                if not e.kind or e.kind in classes]
     if experiment.get("task") == "fracture":
-        entries = corpus.readable(entries)
+        entries = corpus.single_meshes(entries)
     kind = arguments.sample or experiment.get("sample")
     choose = corpus.pairs if experiment.get("task") == "combine" else \
         corpus.listed if kind == "listed" else corpus.sample

@@ -124,14 +124,14 @@ def sample(entries, count, seed):
     return [e for e in entries if e.sha256 in chosen]
 
 
-def readable(entries):
-    """Returns the entries of the formats that polygons.py reads."""
+def single_meshes(entries):
+    """Returns the entries of formats without scenes."""
     return [e for e in entries if e.format.removesuffix(".gz") in ("obj", "off", "ply", "stl")]
 
 
 def pairs(entries, count, seed):
-    """Returns random pairs of readable entries, each with all operations."""
-    known = sorted(readable(entries), key=lambda e: e.sha256)
+    """Returns random pairs of single meshes, each with all operations."""
+    known = sorted(single_meshes(entries), key=lambda e: e.sha256)
     if len(known) < 2 or count == "all":
         raise LabError("the task combine requires a number of pairs, and two models in OBJ, OFF, PLY or STL")
     draw, chosen = random.Random(seed), {}

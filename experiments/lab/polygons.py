@@ -1,13 +1,18 @@
-"""Polygons of mesh files (OBJ, OFF, PLY and STL, also gzipped): samples, rays, pictures and solids."""
+"""Polygons of mesh files (OBJ, OFF, PLY, STL, glTF, 3MF, also gzipped): samples, rays, pictures, solids."""
 
 import gzip
 import io
+import pathlib
 import re
+import zipfile
 import zlib
+from xml.etree import ElementTree
 
 import numpy
 from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
+
+from . import scenes
 
 UNIT_TRIANGLE = numpy.array([[1.0, 0, 0], [0, 1, 0], [0, 0, 1]])
 _TYPES = {"char": "i1", "uchar": "u1", "short": "i2", "ushort": "u2", "int": "i4", "uint": "u4",
@@ -23,14 +28,20 @@ def read(path):
     name = str(path).lower().removesuffix(".gz")
     reader = next((r for end, r in ((".obj", _obj), (".off", _off), (".ply", _ply), (".stl", _stl))
                    if name.endswith(end)), None)
-    if not reader:
-        raise ValueError(f"{path}: only OBJ, OFF, PLY and STL are read here")
+    scene = next((r for end, r in ((".gltf", scenes.gltf), (".glb", scenes.gltf), (".3mf", scenes.three_mf))
+                  if name.endswith(end)), None)
+    if not reader and not scene:
+        raise ValueError(f"{path}: only OBJ, OFF, PLY, STL, glTF and 3MF are read here")
     try:
         with (gzip.open if str(path).lower().endswith(".gz") else open)(path, "rb") as file:
-            points, fans, is_triangle = reader(file.read())
-        corners = numpy.asarray(points, float).reshape(-1, 3)[numpy.asarray(fans, int).reshape(-1, 3)]
-    except (LookupError, TypeError, OverflowError, StopIteration, EOFError, OSError,
-            zlib.error) as error:
+            data = file.read()
+        if scene:
+            corners, is_triangle = scene(data, pathlib.Path(path).parent), True
+        else:
+            points, fans, is_triangle = reader(data)
+            corners = numpy.asarray(points, float).reshape(-1, 3)[numpy.asarray(fans, int).reshape(-1, 3)]
+    except (LookupError, TypeError, AttributeError, OverflowError, RecursionError, StopIteration, EOFError,
+            OSError, zlib.error, zipfile.BadZipFile, ElementTree.ParseError) as error:
         raise ValueError(f"{path}: the file is damaged: {error}") from None
     if not len(corners) or not numpy.isfinite(corners).all():
         raise ValueError(f"{path}: the file has no polygon, or a coordinate is not finite")

@@ -114,7 +114,7 @@ def visible_distance(ask, model, output, scale, limit):
     try:
         points = polygons.distant_visible_points(*polygons.read(model), polygons.read(output)[0], limit)
     except ValueError:
-        return 0.0  # a format that is not read here: the claim is not checked
+        return 0.0  # a file that is not read here: the claim is not checked
     if not len(points):
         return 0.0
     # Triangles that are small compared with the rounding stand for the points.

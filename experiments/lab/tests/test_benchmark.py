@@ -1,5 +1,7 @@
+import base64
 import collections
 import hashlib
+import io
 import json
 import os
 import pathlib
@@ -8,6 +10,7 @@ import subprocess
 import sys
 import tempfile
 import unittest
+import zipfile
 from unittest import mock
 
 import numpy
@@ -191,7 +194,8 @@ class Rates(unittest.TestCase):
 
 class Corpus(unittest.TestCase):
     def test_the_size_of_a_package_is_asked_for_once(self):
-        entries, said = [corpus.Entry("p", "1", f, f"{i}" * 64, "off", 1, "none") for i, f in enumerate("ab")], []
+        entries = [corpus.Entry("p", "1", name, name * 64, "off", 1, "none") for name in "ab"]
+        said = []
         with mock.patch.object(corpus, "_package_bytes", return_value=3 * 2**20) as size, \
                 mock.patch.object(corpus, "_download"), mock.patch.object(corpus, "_unpack") as unpack:
             corpus.fetch(entries, pathlib.Path("absent"), said.append)
@@ -270,6 +274,10 @@ class Polygons(unittest.TestCase):
                 found, is_triangle = polygons.read(path)
                 numpy.testing.assert_array_equal(found, corners, name)
                 self.assertTrue(is_triangle.all())
+            for name, content in self.scene_files(corners / 2 - 3).items():
+                path = pathlib.Path(work) / name
+                path.write_bytes(content)
+                numpy.testing.assert_allclose(polygons.read(path)[0], corners, err_msg=name)
             path.write_text("solid")
             for wrong in (path, pathlib.Path(work) / "a.off.partial"):
                 wrong.touch()
@@ -278,6 +286,39 @@ class Polygons(unittest.TestCase):
         self.assertEqual(polygons.picture(corners, ([0, 0, 0], [2, 2, 2]))[:4], b"\x89PNG")
         self.assertEqual(polygons.thin_share(corners, 0.1), 0)
         self.assertEqual(polygons.thin_share(corners, 2.1), 1)
+
+
+    def scene_files(self, corners):
+        """Returns a mesh of half the size, moved by -3, with transforms that restore it, by names of files."""
+        points, order = numpy.unique(corners.reshape(-1, 3), axis=0, return_inverse=True)
+        binary = order.astype("<u2").tobytes() + points.astype("<f4").tobytes()
+        document = {
+            "asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": [1]}],
+            "nodes": [{"mesh": 0, "translation": [3, 3, 3]},
+                      {"children": [0], "matrix": [2, 0, 0, 0, 0, 2, 0, 0, 0, 0, 2, 0, 0, 0, 0, 1]}],
+            "meshes": [{"primitives": [{"attributes": {"POSITION": 1}, "indices": 0},
+                                       {"attributes": {"POSITION": 1}, "mode": 1}]}],  # lines
+            "accessors": [{"bufferView": 0, "componentType": 5123, "count": 36, "type": "SCALAR"},
+                          {"bufferView": 1, "componentType": 5126, "count": 8, "type": "VEC3"}],
+            "bufferViews": [{"buffer": 0, "byteOffset": 0, "byteLength": 72},
+                            {"buffer": 0, "byteOffset": 72, "byteLength": 96}],
+            "buffers": [{"byteLength": len(binary)}]}
+        text = json.dumps(document).encode()
+        length = (20 + len(text) + 8 + len(binary)).to_bytes(4, "little")
+        glb = b"glTF" + b"\2\0\0\0" + length + len(text).to_bytes(4, "little") + b"JSON" + text \
+            + len(binary).to_bytes(4, "little") + b"BIN\0" + binary
+        document["buffers"][0]["uri"] = "data:;base64," + base64.b64encode(binary).decode()
+        vertices = "".join('<vertex x="%g" y="%g" z="%g"/>' % tuple(p) for p in points)
+        triangles = "".join('<triangle v1="%d" v2="%d" v3="%d"/>' % tuple(t) for t in order.reshape(-1, 3))
+        model = f"""<model xmlns="http://schemas.microsoft.com/3dmanufacturing/core/2015/02"><resources>
+            <object id="1"><mesh><vertices>{vertices}</vertices><triangles>{triangles}</triangles></mesh>
+            </object><object id="2"><components>
+            <component objectid="1" transform="1 0 0 0 1 0 0 0 1 3 3 3"/></components></object></resources>
+            <build><item objectid="2" transform="2 0 0 0 2 0 0 0 2 0 0 0"/></build></model>"""
+        archive = io.BytesIO()
+        with zipfile.ZipFile(archive, "w") as out:
+            out.writestr("3D/3dmodel.model", model)
+        return {"a.gltf": json.dumps(document).encode(), "a.glb": glb, "a.3mf": archive.getvalue()}
 
 
 class Solids(unittest.TestCase):
