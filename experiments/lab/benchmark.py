@@ -331,7 +331,7 @@ class Benchmark:
                 else "the output is missing or not a mesh"
             return {**row, "status": "wrong output", "message": what}, None
         report = reports[0] if len(reports) == 1 else {
-            key: sum(r[key] for r in reports) for key in (*DEFECTS, "triangles", "quads", "components")}
+            key: sum(r[key] or 0 for r in reports) for key in (*DEFECTS, "triangles", "quads", "components")}
 
         def ask(reference, *options):
             found = self._ask("validate", output, "--reference", reference, "--samples", "20000",

@@ -570,9 +570,13 @@ end(claims=dict(watertight=True))"""
         rows = self.run_methods([right, self.adapter("whole", f"{mkdir}write(CUBE); end()"),
                                  self.adapter("open", f"{mkdir}write(CUBE, 11); end(claims=dict("
                                               "watertight=True))"),
+                                 self.adapter("twice", f"{mkdir}write(CUBE, 11); request['output'] = "
+                                              "request['output'].replace('1.ply', '2.ply'); write(CUBE, 11); "
+                                              "end()"),
                                  self.adapter("none", "end()")], task="fracture", resolution=50)
-        self.assertEqual([row["status"] for row in rows], ["done", "done", "done", "wrong output"])
-        self.assertEqual([row["near"] for row in rates.counted(rows)], [True, False, False, False])
+        self.assertEqual([row["status"] for row in rows], ["done"] * 4 + ["wrong output"])
+        self.assertEqual([row["near"] for row in rates.counted(rows)], [True] + 4 * [False])
+        self.assertEqual(rows[3]["defects"]["boundary_edges"], 2 * rows[2]["defects"]["boundary_edges"])
         self.assertEqual(rows[2]["failed_claims"], ["watertight"])
         self.assertGreater(rows[0]["pieces"], 2)
         self.assertLess(rows[1]["volume_error"], 1e-6)  # only the planes reveal that it is not cut
