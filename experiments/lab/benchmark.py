@@ -349,18 +349,21 @@ class Benchmark:
                                                           model["largest_coordinate"], ask, path)
             except LabError as error:
                 return {**row, "status": "wrong output", "message": str(error)}, None
-        elif self.task == "combine":
+        elif self.task in ("combine", "fracture"):
             try:
-                solids = [polygons.read(file)[0] for file in (path, request["second"], output)]
+                made = [polygons.read(file)[0] for file in files]
             except ValueError as error:
                 return {**row, "status": "wrong output", "message": str(error)}, None
-            row |= {"wrong": polygons.wrong_share(*solids, request["operation"]), "volume": report["volume"]}
-        elif self.task == "fracture":
-            pieces, (whole,) = [polygons.read(file)[0] for file in files], model["volumes"]
-            planes = numpy.array([p.split(",") for p in request["planes"].split(";")], float)
-            total = sum(map(polygons.volume, pieces))
-            row |= {"pieces": len(pieces), "volume": total, "volume_error": abs(total - whole) / whole,
-                    "wrong": polygons.misplaced_share(polygons.read(path)[0], pieces, planes)}
+            solid = polygons.read(path)[0]
+            if self.task == "combine":
+                second = polygons.read(request["second"])[0]
+                row |= {"wrong": polygons.wrong_share(solid, second, *made, request["operation"]),
+                        "volume": report["volume"]}
+            else:
+                planes = numpy.array([p.split(",") for p in request["planes"].split(";")], float)
+                (whole,), total = model["volumes"], sum(map(polygons.volume, made))
+                row |= {"pieces": len(made), "volume": total, "volume_error": abs(total - whole) / whole,
+                        "wrong": polygons.misplaced_share(solid, made, planes)}
         else:  # without visible surface, the shares are undefined and nothing is lost
             row |= {share: report["visible_loss"][f"{share}_share"]["value"] or 0.0
                     for share in ("lost", "vanished", "filled", "invented")}

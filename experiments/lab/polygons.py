@@ -208,7 +208,7 @@ def _segments(solids, lines, planes=numpy.empty((0, 4))):
     lengths, which solids they are in (n, solids), and on which sides of the planes they are (n, planes).
     """
     for line, found in zip(lines, zip(*(_crossings(solid, lines) for solid in solids))):
-        with numpy.errstate(divide="ignore"):
+        with numpy.errstate(divide="ignore", invalid="ignore"):  # vertical planes
             cuts = (planes[:, 3] - planes[:, :2] @ line) / planes[:, 2]
         height = numpy.concatenate([*(z for z, _ in found), cuts[numpy.isfinite(cuts)]])
         change = numpy.zeros((len(height), len(solids)), int)
