@@ -5,7 +5,7 @@ An experiment file (TOML) has these keys:
 base        another file with some of these keys, which this one replaces; its methods follow (optional)
 without     names of methods of the base that are left out (optional)
 question    one sentence
-task        "remesh" (default), "simplify", which requires an error, or "combine"
+task        "remesh" (default), "simplify", which requires an error, "combine", or "fracture"
 corpus      table of files in experiments/data
 classes     classes of models to take; all if absent
 models      number of files, "all", or numbers by tier: {quick = 60, full = 500}; for "combine", of random
@@ -21,10 +21,11 @@ memory_mib  limit of address space per run
             adapter  a program that follows the protocol (PROTOCOL.md) and its first arguments; words with a
                      slash are paths in the checkout
             request  a program without an adapter and its arguments, in which {hermesh}, {input}, {output},
-                     {second} and {operation} (of "combine"),
+                     {second} and {operation} (of "combine"), {planes} (of "fracture"),
                      {resolution}, {voxel} (or {error}, in the units of the file), {seed} and {threads} are
                      replaced; `claims` has what it claims of each mesh, e.g.
                      {watertight = true, distance_to_input = "{error}"}
+            `tier = "full"` leaves the method out of the tier quick, unless --method names it
 
 Each run is a process of its own. Its row is on disk when it ends, and the same command continues after an
 interruption. Meshes are validated with `hermesh validate`, which shares no code with the methods.
@@ -53,6 +54,7 @@ FLAT = 1e-6  # thickness over length
 THIN = 0.02  # share of the area that is thinner than a voxel
 THIN_RESOLUTION = 100
 VALIDATION = child.Limits(seconds=600, memory_mib=16_384)
+PLANES = 3  # that cut a solid to fracture
 DEFECTS = ("boundary_edges", "non_manifold_edges", "non_manifold_vertices", "inconsistent_edges",
            "inside_out_components", "self_intersecting_pairs")
 REQUIRED = {"question", "corpus", "models", "seed", "resolution", "seconds", "memory_mib", "method"}
@@ -75,8 +77,10 @@ def read_experiment(path):
     if difference := (REQUIRED - experiment.keys()) | (experiment.keys() - REQUIRED - OPTIONAL):
         raise LabError(f"{path}: unknown or missing keys: {', '.join(sorted(difference))}")
     allowed = {"name", "request"}, {"name", "request", "claims"}, {"name", "adapter"}
-    if any(method.keys() not in allowed for method in experiment["method"]):
+    if any(method.keys() - {"tier"} not in allowed for method in experiment["method"]):
         raise LabError(f"{path}: a [[method]] has a name, and an adapter or a request with optional claims")
+    if any(method.get("tier", "full") != "full" for method in experiment["method"]):
+        raise LabError(f"{path}: the tier of a [[method]] must be \"full\" or absent")
     if (task := experiment.get("task", "remesh")) not in protocol.TASKS:
         raise LabError(f"{path}: unknown task '{task}'; expected {', '.join(protocol.TASKS)}")
     if task == "simplify" and "error" not in experiment:
@@ -138,6 +142,14 @@ def pair_facts(ask, pair, files):
             "diagonal": math.dist(lower, upper), "triangles": sum(f["triangles"] for f in found),
             **{key: max(f[key] for f in found) for key in ("size", "largest_coordinate")},
             "pair": pair.key, "volumes": [polygons.volume(polygons.read(file)[0]) for file in files]}
+
+
+def solid_facts(ask, key, file):
+    """Returns what is computed of a solid to fracture, with the planes that cut it."""
+    solid = polygons.read(file)[0]
+    planes = polygons.random_planes(solid, PLANES, int(key[:8], 16))
+    return {**facts(ask, file), "volumes": [polygons.volume(solid)],
+            "planes": ";".join(",".join(map(repr, plane)) for plane in planes.tolist())}
 
 
 def _pool(jobs):
@@ -216,11 +228,15 @@ class Benchmark:
     def _run_model(self, task, cache, is_first=False):
         """Runs methods on a model or a pair, and appends their rows."""
         entry, methods = task
-        if not isinstance(entry, corpus.Pair):
-            path = corpus.location(entry, cache)
+        path = corpus.location(entry, cache)
+        if self.task not in ("combine", "fracture"):
             return self._run_methods(entry, methods, is_first, path, lambda: facts(self._ask, path))
         with tempfile.TemporaryDirectory() as folder:
             files = [pathlib.Path(folder) / "first.obj", pathlib.Path(folder) / "second.obj"]
+            if self.task == "fracture":
+                polygons.write_obj(files[0], polygons.solid(polygons.read(path)[0]))
+                return self._run_methods(entry, methods, is_first, files[0],
+                                         lambda: solid_facts(self._ask, entry.sha256, files[0]))
             write_pair(entry, cache, files)
             return self._run_methods(entry, methods, is_first, files[0],
                                      lambda: pair_facts(self._ask, entry, files))
@@ -243,14 +259,14 @@ class Benchmark:
 
     def _run_method(self, model, path, method):
         with tempfile.TemporaryDirectory() as work:
-            row, output = self._measure(model, path, method, work)
+            row, outputs = self._measure(model, path, method, work)
             row = {"sha256": model["sha256"], "method": method["name"], "commit": self.build["commit"], **row}
             if "message" in row:  # must not depend on directories of this machine
                 for folder in (work, path.parent, ROOT):
                     row["message"] = row["message"].replace(f"{folder}/", "")
                 row["message"] = row["message"][:500]
             if row["status"] != "not installed" and rates.trouble(row):
-                self._draw(model, path, row, output)
+                self._draw(model, path, row, outputs)
         return row
 
     def _measure(self, model, path, method, work):
@@ -261,6 +277,8 @@ class Benchmark:
             goal = {"error": experiment["error"] * model["diagonal"], "resolution": None}
         if self.task == "combine":
             goal |= {"second": str(path.with_name("second.obj")), "operation": model["class"]}
+        elif self.task == "fracture":
+            goal |= {"planes": model["planes"]}
         file, request, environment = protocol.write_request(
             work, task=self.task, input=str(path), **goal, seed=experiment["seed"],
             threads=experiment.get("threads", 1), seconds=experiment["seconds"],
@@ -301,15 +319,19 @@ class Benchmark:
 
     def _validate(self, row, model, path, request, voxel, claims, seconds, ended):
         output = request["output"]
+        files = sorted(file for end in ("ply", "obj") for file in pathlib.Path(output).glob(f"*.{end}")) \
+            if self.task == "fracture" else [output]
         reason = []
-        reference = [] if self.task == "combine" else [
+        reference = [] if self.task in ("combine", "fracture") else [
             "--reference", str(path), "--voxel-size", repr(voxel), "--samples", "20000",
             "--solid-samples", "0"]
-        report = self._ask("validate", output, *reference, reason=reason)
-        if not report or not report.get("visible_loss" if reference else "area"):
+        reports = [self._ask("validate", str(file), *reference, reason=reason) for file in files]
+        if not reports or any(not r or not r.get("visible_loss" if reference else "area") for r in reports):
             what = f"the validation ended with: {reason[0]}" if reason and reason[0].endswith("limit") \
                 else "the output is missing or not a mesh"
             return {**row, "status": "wrong output", "message": what}, None
+        report = reports[0] if len(reports) == 1 else {
+            key: sum(r[key] or 0 for r in reports) for key in (*DEFECTS, "triangles", "quads", "components")}
 
         def ask(reference, *options):
             found = self._ask("validate", output, "--reference", reference, "--samples", "20000",
@@ -327,34 +349,44 @@ class Benchmark:
                                                           model["largest_coordinate"], ask, path)
             except LabError as error:
                 return {**row, "status": "wrong output", "message": str(error)}, None
-        elif self.task == "combine":
+        elif self.task in ("combine", "fracture"):
             try:
-                solids = [polygons.read(file)[0] for file in (path, request["second"], output)]
+                made = [polygons.read(file)[0] for file in files]
             except ValueError as error:
                 return {**row, "status": "wrong output", "message": str(error)}, None
-            row |= {"wrong": polygons.wrong_share(*solids, request["operation"]), "volume": report["volume"]}
+            solid = polygons.read(path)[0]
+            if self.task == "combine":
+                second = polygons.read(request["second"])[0]
+                row |= {"wrong": polygons.wrong_share(solid, second, *made, request["operation"]),
+                        "volume": report["volume"]}
+            else:
+                planes = numpy.array([p.split(",") for p in request["planes"].split(";")], float)
+                (whole,), total = model["volumes"], sum(map(polygons.volume, made))
+                row |= {"pieces": len(made), "volume": total, "volume_error": abs(total - whole) / whole,
+                        "wrong": polygons.misplaced_share(solid, made, planes)}
         else:  # without visible surface, the shares are undefined and nothing is lost
             row |= {share: report["visible_loss"][f"{share}_share"]["value"] or 0.0
                     for share in ("lost", "vanished", "filled", "invented")}
         if seconds is not None:
             row["seconds"] = seconds
-        mib = (os.path.getsize(path) + os.path.getsize(output)) / child.MIB
+        mib = sum(map(os.path.getsize, [path, *files])) / child.MIB
         try:
             row["failed_claims"] = protocol.failed_claims(
                 claims, seconds, ended, mib, report, model["largest_coordinate"], ask, path, output)
         except LabError as error:
             row["message"] = f"claims are not checked: {error}"
-        return row, output
+        return row, files
 
-    def _draw(self, model, path, row, output):
-        """Writes pictures of a model and of an output for the gallery, unless they are of other formats."""
+    def _draw(self, model, path, row, outputs):
+        """Writes pictures of a model and of an output for the gallery, unless they cannot be read."""
         folder = self.out / "pictures"
         folder.mkdir(exist_ok=True)
-        for source, name in ((path, rates.picture_name(row["sha256"])),
-                             (output, rates.picture_name(row["sha256"], row["method"]))):
-            if source is not None and not (folder / name).exists():
+        for sources, name in (([path], rates.picture_name(row["sha256"])),
+                              (outputs, rates.picture_name(row["sha256"], row["method"]))):
+            if sources and not (folder / name).exists():
                 with contextlib.suppress(ValueError):
-                    (folder / name).write_bytes(polygons.picture(polygons.read(source)[0], model["box"]))
+                    corners = numpy.concatenate([polygons.read(source)[0] for source in sources])
+                    (folder / name).write_bytes(polygons.picture(corners, model["box"]))
 
 
 def classify_corpus(path, hermesh, cache, seed, say):
@@ -393,7 +425,7 @@ def add_command(subparsers):
                         help="also run this program with the first method's arguments, e.g. another version")
     parser.add_argument("--method", action="append", help="run only this method; may be repeated")
     parser.add_argument("--tier", choices=["quick", "full"], default="quick",
-                        help="number of models that the experiment specifies for this tier (default: quick)")
+                        help="models and methods that the experiment has for this tier (default: quick)")
     parser.add_argument("--models", type=int, help="number of models instead of the experiment's")
     parser.add_argument("--sample", choices=["random", "listed"],
                         help="kind of sample instead of the experiment's")
@@ -433,6 +465,14 @@ def _parse_shard(text):
     return number, count
 
 
+def select_methods(methods, tier, names=None):
+    """Returns the methods with these names or, without names, those of a tier."""
+    if unknown := set(names or []) - {method["name"] for method in methods}:
+        raise LabError(f"unknown method {', '.join(sorted(unknown))}; expected "
+                       f"{', '.join(method['name'] for method in methods)}")
+    return [m for m in methods if (m["name"] in names if names else tier in ("full", m.get("tier", "quick")))]
+
+
 def run(arguments):
     say, cache = functools.partial(print, file=sys.stderr, flush=True), corpus.cache_directory()
     if arguments.compare:
@@ -456,16 +496,14 @@ def run(arguments):
                            "method with a request first")
         request = [path if word == "{hermesh}" else word for word in first["request"]]
         experiment["method"].append({**first, "name": name, "request": request})
-    if arguments.method:
-        known = [method["name"] for method in experiment["method"]]
-        if unknown := set(arguments.method) - set(known):
-            raise LabError(f"{file}: unknown method {', '.join(unknown)}; expected {', '.join(known)}")
-        experiment["method"] = [m for m in experiment["method"] if m["name"] in arguments.method]
+    experiment["method"] = select_methods(experiment["method"], arguments.tier, arguments.method)
     models = experiment["models"]
     models = arguments.models or (models[arguments.tier] if isinstance(models, dict) else models)
     classes = experiment.get("classes", rates.CLASSES)
     entries = [e for e in corpus.read_corpus(ROOT / "experiments/data" / experiment["corpus"])
                if not e.kind or e.kind in classes]
+    if experiment.get("task") == "fracture":
+        entries = corpus.single_meshes(entries)
     kind = arguments.sample or experiment.get("sample")
     choose = corpus.pairs if experiment.get("task") == "combine" else \
         corpus.listed if kind == "listed" else corpus.sample

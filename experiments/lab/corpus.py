@@ -124,10 +124,14 @@ def sample(entries, count, seed):
     return [e for e in entries if e.sha256 in chosen]
 
 
+def single_meshes(entries):
+    """Returns the entries of formats without scenes."""
+    return [e for e in entries if e.format.removesuffix(".gz") in ("obj", "off", "ply", "stl")]
+
+
 def pairs(entries, count, seed):
-    """Returns random pairs of entries of the formats that polygons.py reads, each with all operations."""
-    known = sorted((e for e in entries if e.format.removesuffix(".gz") in ("obj", "off", "ply", "stl")),
-                   key=lambda e: e.sha256)
+    """Returns random pairs of single meshes, each with all operations."""
+    known = sorted(single_meshes(entries), key=lambda e: e.sha256)
     if len(known) < 2 or count == "all":
         raise LabError("the task combine requires a number of pairs, and two models in OBJ, OFF, PLY or STL")
     draw, chosen = random.Random(seed), {}
@@ -161,14 +165,14 @@ def fetch(entries, cache, say):
     Raises LabError if a package cannot be downloaded, or a file differs from the corpus.
     """
     missing = [e for e in entries if not location(e, cache).exists()]
-    packages = sorted({e.package for e in missing})
-    if packages:
-        total = sum(map(_package_bytes, packages)) / 2**20
-        say(f"{len(missing)} models are in {len(packages)} packages: {total:.0f} MiB to download")
-    for package in packages:
+    sizes = {package: _package_bytes(package) / 2**20 for package in sorted({e.package for e in missing})}
+    if sizes:
+        say(f"{len(missing)} models are in {len(sizes)} packages: {sum(sizes.values()):.0f} MiB to download")
+    for package, size in sizes.items():
+        say(f"downloading {package}, {size:.0f} MiB")
         wanted = [e for e in missing if e.package == package]
         with tempfile.TemporaryDirectory() as work:
-            _unpack(_download(package, work, say), wanted, cache, work)
+            _unpack(_download(package, work), wanted, cache, work)
 
 
 def _package_bytes(package):
@@ -180,8 +184,7 @@ def _package_bytes(package):
     return next((int(line.split()[1]) for line in shown.stdout.splitlines() if line.startswith("Size:")), 0)
 
 
-def _download(package, work, say):
-    say(f"downloading {package}, {_package_bytes(package) / 2**20:.0f} MiB")
+def _download(package, work):
     try:
         got = subprocess.run(["apt-get", "download", package], cwd=work, capture_output=True, text=True)
     except FileNotFoundError:

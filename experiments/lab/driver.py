@@ -328,6 +328,7 @@ class Run:
         missing, else 1 if a cell failed. Raises LabError if there is no such cell, and for an error of the
         whole run.
         """
+        offline = os.environ.get("HERMESH_OFFLINE")
         try:
             groups = [{"name": self.name + "/"}]
             if self.kind != "measurement":
@@ -347,6 +348,9 @@ class Run:
                                "case/resolution/variant")
             return exit_code(self.rows), self._summary()
         finally:
+            os.environ.pop("HERMESH_OFFLINE", None)
+            if offline is not None:
+                os.environ["HERMESH_OFFLINE"] = offline
             if not self.arguments.quiet:
                 sys.stderr.write("".join(f"note: {note}\n" for note in self.notes))
 
@@ -358,7 +362,7 @@ class Run:
 
         reason = models.fetch([group["case"]["name"] for group in groups if "case" in group], say)
         if reason:
-            os.environ.setdefault("HERMESH_OFFLINE", reason)
+            os.environ["HERMESH_OFFLINE"] = os.environ.get("HERMESH_OFFLINE") or reason
 
     def _say_done(self, done, groups):
         """Prints a line for each finished group, unless a terminal shows the progress, and logs it."""

@@ -1,13 +1,18 @@
-"""Polygons of mesh files (OBJ, OFF, PLY and STL, also gzipped): samples, rays, pictures and solids."""
+"""Polygons of mesh files (OBJ, OFF, PLY, STL, glTF, 3MF, also gzipped): samples, rays, pictures, solids."""
 
 import gzip
 import io
+import pathlib
 import re
+import zipfile
 import zlib
+from xml.etree import ElementTree
 
 import numpy
 from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
+
+from . import scenes
 
 UNIT_TRIANGLE = numpy.array([[1.0, 0, 0], [0, 1, 0], [0, 0, 1]])
 _TYPES = {"char": "i1", "uchar": "u1", "short": "i2", "ushort": "u2", "int": "i4", "uint": "u4",
@@ -23,14 +28,20 @@ def read(path):
     name = str(path).lower().removesuffix(".gz")
     reader = next((r for end, r in ((".obj", _obj), (".off", _off), (".ply", _ply), (".stl", _stl))
                    if name.endswith(end)), None)
-    if not reader:
-        raise ValueError(f"{path}: only OBJ, OFF, PLY and STL are read here")
+    scene = next((r for end, r in ((".gltf", scenes.gltf), (".glb", scenes.gltf), (".3mf", scenes.three_mf))
+                  if name.endswith(end)), None)
+    if not reader and not scene:
+        raise ValueError(f"{path}: only OBJ, OFF, PLY, STL, glTF and 3MF are read here")
     try:
         with (gzip.open if str(path).lower().endswith(".gz") else open)(path, "rb") as file:
-            points, fans, is_triangle = reader(file.read())
-        corners = numpy.asarray(points, float).reshape(-1, 3)[numpy.asarray(fans, int).reshape(-1, 3)]
-    except (LookupError, TypeError, OverflowError, StopIteration, EOFError, OSError,
-            zlib.error) as error:
+            data = file.read()
+        if scene:
+            corners, is_triangle = scene(data, pathlib.Path(path).parent), True
+        else:
+            points, fans, is_triangle = reader(data)
+            corners = numpy.asarray(points, float).reshape(-1, 3)[numpy.asarray(fans, int).reshape(-1, 3)]
+    except (LookupError, TypeError, AttributeError, OverflowError, RecursionError, StopIteration, EOFError,
+            OSError, zlib.error, zipfile.BadZipFile, ElementTree.ParseError) as error:
         raise ValueError(f"{path}: the file is damaged: {error}") from None
     if not len(corners) or not numpy.isfinite(corners).all():
         raise ValueError(f"{path}: the file has no polygon, or a coordinate is not finite")
@@ -151,17 +162,30 @@ def _inner_point(corners, seed):
     return point[0] + (numpy.random.default_rng(seed).random() * depth if depth < numpy.inf else 0) * inwards
 
 
+def solid(corners):
+    """Returns a solid with a positive volume, in single precision."""
+    return (corners if volume(corners) > 0 else corners[:, ::-1]).astype(numpy.float32).astype(float)
+
+
 def place(first, second, seed):
     """Returns two solids that overlap, in single precision and with positive volumes.
 
     The second one is scaled to the diagonal of the first and rotated, and a random point within it is moved
     to a random point within the first.
     """
-    first, second = (s if volume(s) > 0 else s[:, ::-1] for s in (first, second))
+    first, second = solid(first), solid(second)
     diagonals = [numpy.linalg.norm(numpy.ptp(s.reshape(-1, 3), axis=0)) for s in (first, second)]
     second = diagonals[0] / diagonals[1] * second @ Rotation.random(random_state=seed).as_matrix().T
     second = second + _inner_point(first, seed) - _inner_point(second, seed + 1)
-    return [s.astype(numpy.float32).astype(float) for s in (first, second)]
+    return [first, solid(second)]
+
+
+def random_planes(corners, count, seed):
+    """Returns planes through random points within a solid: unit normals and offsets (count, 4)."""
+    normals = numpy.random.default_rng(seed).normal(size=(count, 3))
+    normals /= numpy.linalg.norm(normals, axis=1)[:, None]
+    points = [_inner_point(corners, seed + i) for i in range(count)]
+    return numpy.column_stack([normals, numpy.einsum("ij,ij->i", normals, points)])
 
 
 def _crossings(corners, lines):
@@ -179,6 +203,43 @@ def _crossings(corners, lines):
         yield (weights * near[is_hit, :, 2]).sum(axis=1) / total, -numpy.sign(total).astype(int)
 
 
+def _segments(solids, lines, planes=numpy.empty((0, 4))):
+    """Yields, for each vertical line, its segments between crossings with the solids and the planes: their
+    lengths, which solids they are in (n, solids), and on which sides of the planes they are (n, planes).
+    """
+    for line, found in zip(lines, zip(*(_crossings(solid, lines) for solid in solids))):
+        with numpy.errstate(divide="ignore", invalid="ignore"):  # vertical planes
+            cuts = (planes[:, 3] - planes[:, :2] @ line) / planes[:, 2]
+        height = numpy.concatenate([*(z for z, _ in found), cuts[numpy.isfinite(cuts)]])
+        change = numpy.zeros((len(height), len(solids)), int)
+        change[:sum(len(z) for z, _ in found)] = numpy.concatenate(
+            [numpy.outer(sign, unit) for (_, sign), unit in zip(found, numpy.eye(len(solids), dtype=int))])
+        order = numpy.argsort(height)
+        height = height[order]
+        middle = (height[1:] + height[:-1]) / 2
+        sides = numpy.outer(middle, planes[:, 2]) + planes[:, :2] @ line > planes[:, 3]
+        yield numpy.diff(height), numpy.cumsum(change[order], axis=0)[:-1] > 0, sides
+
+
+def misplaced_share(solid, pieces, planes, count=1000):
+    """Returns the volume in which the pieces of a solid that is cut by planes are wrong, as a share of it:
+    volume of the solid that is in no piece, in several, or in a piece with more volume in another cell of the
+    planes, and volume of pieces outside the solid. It is integrated along random vertical lines.
+    """
+    low, high = (side(solid.reshape(-1, 3), axis=0) for side in (numpy.min, numpy.max))
+    lines = numpy.random.default_rng(0).uniform(low[:2], high[:2], (count, 2))
+    total = wrong = 0.0
+    volumes = numpy.zeros((len(pieces), 2**len(planes)))  # of pieces in cells
+    for length, inside, sides in _segments([solid, *pieces], lines, planes):
+        is_one = inside[:, 0] & (inside[:, 1:].sum(axis=1) == 1)
+        total += length[inside[:, 0]].sum()
+        wrong += length[inside.any(axis=1) & ~is_one].sum()
+        cells = sides @ 2**numpy.arange(len(planes))
+        numpy.add.at(volumes, (inside[is_one, 1:].argmax(axis=1), cells[is_one]), length[is_one])
+    wrong += volumes.sum() - volumes.max(axis=1).sum()
+    return float(wrong / total) if total else 1.0
+
+
 def wrong_share(first, second, output, operation, count=1000):
     """Returns the volume in which a mesh differs from the result of an operation, as a share of the result.
 
@@ -193,13 +254,9 @@ def wrong_share(first, second, output, operation, count=1000):
     area = numpy.prod(high[:2] - low[:2]) / count  # that a line represents
     lines = numpy.random.default_rng(0).uniform(low[:2], high[:2], (count, 2))
     wrong = total = within = 0.0
-    for found in zip(*(_crossings(solid, lines) for solid in (first, second, output))):
-        height = numpy.concatenate([z for z, _ in found])
-        change = numpy.concatenate([numpy.outer(sign, unit) for (_, sign), unit in zip(found, numpy.eye(3))])
-        order = numpy.argsort(height)
-        a, b, made = (numpy.cumsum(change[order], axis=0)[:-1] > 0).T
+    for length, inside, _ in _segments((first, second, output), lines):
+        a, b, made = inside.T
         right = {"union": a | b, "intersection": a & b, "difference": a & ~b}[operation]
-        length = numpy.diff(height[order])
         wrong, total, within = (before + area * length[chosen].sum() for before, chosen in (
             (wrong, made != right), (total, right), (within, made)))
     sides = output.reshape(-1, 3)

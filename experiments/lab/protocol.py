@@ -6,7 +6,7 @@ import os
 
 from . import polygons
 
-TASKS = ("remesh", "simplify", "combine")
+TASKS = ("remesh", "simplify", "combine", "fracture")
 NOT_INSTALLED = 77  # exit code of an adapter whose program is not installed
 # Counts of `hermesh validate` that must be 0.
 CLAIMS = {"watertight": ("boundary_edges", "inconsistent_edges"),
@@ -21,7 +21,8 @@ START_SECONDS, SECONDS_PER_MIB, CLOCK_SECONDS = 5.0, 1.0, 0.01
 
 def write_request(directory, **values):
     """Writes request.json; returns its path and the environment with the same values as HERMESH_NAME."""
-    request = {"version": 1, **values, "output": f"{directory}/out.ply",
+    name = "pieces" if values.get("task") == "fracture" else "out.ply"
+    request = {"version": 1, **values, "output": f"{directory}/{name}",
                "result": f"{directory}/result.json"}
     path = f"{directory}/request.json"
     with open(path, "w") as file:
@@ -113,7 +114,7 @@ def visible_distance(ask, model, output, scale, limit):
     try:
         points = polygons.distant_visible_points(*polygons.read(model), polygons.read(output)[0], limit)
     except ValueError:
-        return 0.0  # a format that is not read here: the claim is not checked
+        return 0.0  # a file that is not read here: the claim is not checked
     if not len(points):
         return 0.0
     # Triangles that are small compared with the rounding stand for the points.

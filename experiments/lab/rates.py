@@ -20,7 +20,7 @@ CLASSES = ["clean solid", "closed, self-intersecting", "closed, non-manifold or 
 TAGS = ["several bodies", "thinner than a voxel", "input not clean"]
 LOSS = INVENTED = 0.01  # shares of the visible surface, and of the output, above which they count
 NEAR = {"remesh": "valid and near %", "simplify": "valid and within the bound %",
-        "combine": "valid and right %"}
+        "combine": "valid and right %", "fracture": "valid and right %"}
 WORST = 300  # cases in the gallery
 VARYING = {"cpu_seconds", "wall_seconds", "seconds", "peak_mib", "commit"}  # from day to day
 
@@ -52,11 +52,13 @@ def rate(count, of):
 
 
 def is_near(row):
-    """Returns True if a mesh is near the model, within the bound of a simplification, or the right solid."""
+    """Returns True if a mesh is near the model, within the bound of a simplification, or the right solid, or
+    if pieces are right.
+    """
     if "distance" in row:
         return row["distance"] <= 1
     if "wrong" in row:
-        return row["wrong"] <= LOSS
+        return max(row["wrong"], row.get("volume_error", 0)) <= LOSS
     return row["lost"] <= LOSS and row["invented"] <= INVENTED
 
 
@@ -123,7 +125,11 @@ COLUMNS = {
     "combine": {f"wrong volume > {LOSS:.0%}": _share_above("wrong", LOSS),
                 "median % of wrong volume": _median_percentage("wrong", "%.3f"),
                 f"volumes differ > {LOSS:.0%}": lambda made: rate(
-                    sum(error > LOSS for error in volume_errors(made)), len(volume_errors(made)))}}
+                    sum(error > LOSS for error in volume_errors(made)), len(volume_errors(made)))},
+    "fracture": {f"wrong volume > {LOSS:.0%}": _share_above("wrong", LOSS),
+                 "median % of wrong volume": _median_percentage("wrong", "%.3f"),
+                 f"volumes differ > {LOSS:.0%}": _share_above("volume_error", LOSS),
+                 "median files": lambda made: _median([row["pieces"] for row in made], "%.0f")}}
 
 
 def table(rows, methods, task="remesh"):
@@ -201,6 +207,8 @@ def trouble(row):
         reasons.append((1.2, f"not valid: {defects}"))
     if row.get("wrong", 0) > LOSS:
         reasons.append((row["wrong"], f"{row['wrong']:.1%} of the volume wrong"))
+    if row.get("volume_error", 0) > LOSS:
+        reasons.append((row["volume_error"], f"the volumes differ by {row['volume_error']:.1%}"))
     if row.get("distance", 0) > 1:
         reasons.append((1.1, f"{row['distance']:.2f} times the bound"))
     reasons += [(share, f"{row[key]:.1%} {text}") for key, text in (

@@ -2,6 +2,10 @@
 
 With voxels, or in mode Sharp with cells of that size. Its modifier Boolean with the exact solver:
 blender -b --python blender_peer.py -- IN.obj OUT.obj union|intersection|difference SECOND.obj
+
+Its Bisect with Fill, which writes each piece to a file:
+blender -b --python blender_peer.py -- IN.obj DIRECTORY cut PLANES
+with nx,ny,nz,d of the points x with n·x = d, separated by semicolons.
 """
 import math
 import os
@@ -17,7 +21,7 @@ OPERATIONS = {"union": "UNION", "intersection": "INTERSECT", "difference": "DIFF
 source, target, voxel, adaptivity = sys.argv[sys.argv.index("--") + 1:]
 is_boolean = voxel in OPERATIONS
 # Small models are enlarged, because Blender has no voxels below 0.0001.
-scale = 1.0 if is_boolean else max(1.0, SMALLEST_VOXEL / float(voxel))
+scale = 1.0 if is_boolean or voxel == "cut" else max(1.0, SMALLEST_VOXEL / float(voxel))
 
 
 def add(points, triangles):
@@ -28,8 +32,52 @@ def add(points, triangles):
     return thing
 
 
+def triangulate(mesh):
+    """Splits polygons as the modifier Triangulate: the display's triangles of large polygons intersect."""
+    shape = bmesh.new()
+    shape.from_mesh(mesh)
+    bmesh.ops.triangulate(shape, faces=shape.faces[:], quad_method="BEAUTY", ngon_method="BEAUTY")
+    shape.to_mesh(mesh)
+    mesh.calc_loop_triangles()
+
+
+def write(path, mesh):
+    peer.write_obj(path, [v.co / scale for v in mesh.vertices],
+                   [tuple(t.vertices) for t in mesh.loop_triangles])
+
+
+def half_of(piece, plane, cleared):
+    half = piece.copy()
+    half.data = piece.data.copy()
+    bpy.context.collection.objects.link(half)
+    bpy.context.view_layer.objects.active = half
+    half.select_set(True)
+    bpy.ops.object.mode_set(mode="EDIT")
+    bpy.ops.mesh.select_all(action="SELECT")
+    *normal, offset = plane
+    bpy.ops.mesh.bisect(plane_co=[offset * x for x in normal], plane_no=normal, use_fill=True,
+                        **{cleared: True})
+    bpy.ops.object.mode_set(mode="OBJECT")
+    half.select_set(False)
+    return half
+
+
+def cut(whole, planes):
+    pieces = [whole]
+    for plane in planes:
+        halves = [half_of(piece, plane, side) for piece in pieces for side in ("clear_inner", "clear_outer")]
+        pieces = [half for half in halves if half.data.polygons]
+    return [piece.data for piece in pieces]
+
+
 points, triangles = peer.read_obj(source)
 thing = add(points, triangles)
+if voxel == "cut":
+    planes = [list(map(float, plane.split(","))) for plane in adaptivity.split(";")]
+    for number, mesh in enumerate(peer.measured(lambda: cut(thing, planes)), 1):
+        triangulate(mesh)
+        write(f"{target}/{number}.obj", mesh)
+    sys.exit()
 modifier = thing.modifiers.new("peer", "BOOLEAN" if is_boolean else "REMESH")
 if is_boolean:
     modifier.operation, modifier.solver = OPERATIONS[voxel], "EXACT"
@@ -56,10 +104,5 @@ def work():
 
 made = peer.measured(work)
 if is_boolean:
-    # The display's triangles of polygons with many corners intersect; this is the default of Triangulate.
-    shape = bmesh.new()
-    shape.from_mesh(made)
-    bmesh.ops.triangulate(shape, faces=shape.faces[:], quad_method="BEAUTY", ngon_method="BEAUTY")
-    shape.to_mesh(made)
-    made.calc_loop_triangles()
-peer.write_obj(target, [v.co / scale for v in made.vertices], [tuple(t.vertices) for t in made.loop_triangles])
+    triangulate(made)
+write(target, made)

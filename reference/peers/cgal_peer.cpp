@@ -1,14 +1,17 @@
 // CGAL: edge collapse with Garland and Heckbert's quadrics or Lindstrom and Turk's costs, the latter within a
-// polyhedral envelope, too, alpha wrapping, and Boolean operations by corefinement.
+// polyhedral envelope, too, alpha wrapping, Boolean operations by corefinement, and cuts by planes.
 //
 //   cgal_peer garland-heckbert IN.obj OUT.obj NUMBER
 //   cgal_peer lindstrom-turk IN.obj OUT.obj NUMBER
 //   cgal_peer envelope IN.obj OUT.obj TOLERANCE
 //   cgal_peer alpha-wrap IN.obj OUT.obj ALPHA OFFSET
 //   cgal_peer union|intersection|difference IN.obj OUT.obj SECOND.obj
+//   cgal_peer cut IN.obj DIRECTORY PLANES
 //
+// PLANES are nx,ny,nz,d of the points x with n·x = d, separated by semicolons; each piece is a file.
 // NUMBER is the share of the triangles that remain or, from 1 on, their number; lengths are world units.
 #include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
+#include <CGAL/Polygon_mesh_processing/clip.h>
 #include <CGAL/Polygon_mesh_processing/corefinement.h>
 #include <CGAL/Polygon_mesh_processing/orient_polygon_soup.h>
 #include <CGAL/Polygon_mesh_processing/polygon_soup_to_polygon_mesh.h>
@@ -111,11 +114,41 @@ peers::Mesh alpha_wrap(const peers::Mesh& mesh, double alpha, double offset) {
   return from_cgal(surface);
 }
 
+/// Throws if a mesh does not bound a volume.
+void check_bounds_volume(const Surface& surface) {
+  if (!CGAL::is_closed(surface) || !processing::does_bound_a_volume(surface))
+    throw std::runtime_error("CGAL cannot take a mesh that does not bound a volume");
+}
+
+/// Cuts each piece by each plane with `clip`, once for each side, and writes the pieces.
+void cut(const peers::Mesh& mesh, const std::string& directory, const std::string& planes) {
+  std::vector<Surface> pieces{to_cgal(mesh)};
+  check_bounds_volume(pieces[0]);
+  peers::measured([&] {
+    std::istringstream words(planes);
+    for (std::string word; std::getline(words, word, ';');) {
+      double a = 0, b = 0, c = 0, d = 0;
+      if (std::sscanf(word.c_str(), "%lf,%lf,%lf,%lf", &a, &b, &c, &d) != 4)
+        throw std::runtime_error("invalid plane '" + word + "'; expected nx,ny,nz,d");
+      const Kernel::Plane_3 plane(a, b, c, -d);
+      std::vector<Surface> halves;
+      for (const Surface& piece : pieces)
+        for (const auto& side : {plane, plane.opposite()}) {
+          Surface half = piece;
+          if (!processing::clip(half, side, CGAL::parameters::clip_volume(true)))
+            throw std::runtime_error("CGAL cannot make a manifold mesh of a piece");
+          if (half.number_of_faces() > 0) halves.push_back(std::move(half));
+        }
+      pieces = std::move(halves);
+    }
+  });
+  for (std::size_t i = 0; i < pieces.size(); ++i)
+    peers::write_obj(directory + "/" + std::to_string(i + 1) + ".obj", from_cgal(pieces[i]));
+}
+
 peers::Mesh combined(const peers::Mesh& first, const peers::Mesh& second, const std::string& operation) {
   Surface a = to_cgal(first), b = to_cgal(second), result;
-  for (const Surface* surface : {&a, &b})
-    if (!CGAL::is_closed(*surface) || !processing::does_bound_a_volume(*surface))
-      throw std::runtime_error("CGAL cannot take a mesh that does not bound a volume");
+  check_bounds_volume(a), check_bounds_volume(b);
   bool is_manifold = false;
   peers::measured([&] {
     is_manifold = operation == "union"          ? processing::corefine_and_compute_union(a, b, result)
@@ -134,8 +167,9 @@ int main(int argc, char** argv) {
     if (argc != (method == "alpha-wrap" ? 6 : 5))
       throw std::runtime_error(
           "cgal_peer garland-heckbert|lindstrom-turk|envelope IN OUT NUMBER, or alpha-wrap IN OUT ALPHA "
-          "OFFSET, or union|intersection|difference IN OUT SECOND");
+          "OFFSET, or union|intersection|difference IN OUT SECOND, or cut IN DIRECTORY PLANES");
     const peers::Mesh mesh = peers::read_obj(argv[2]);
+    if (method == "cut") return cut(mesh, argv[3], argv[4]);
     if (method == "union" || method == "intersection" || method == "difference")
       return peers::write_obj(argv[3], combined(mesh, peers::read_obj(argv[4]), method));
     const double number = std::atof(argv[4]);

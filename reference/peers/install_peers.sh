@@ -11,6 +11,7 @@ packages=(libcgal-dev python3-openvdb python3-vtk9 assimp-utils nodejs npm)
 # One by one, because their availability differs between distributions.
 for package in "${packages[@]}"; do
   dpkg-query -W -f='${Status}' "$package" 2>/dev/null | grep -q 'ok installed' && continue
+  [ "$package" = npm ] && command -v npm >/dev/null && continue  # nodejs of other sources contains it
   echo "Installing $package"
   DEBIAN_FRONTEND=noninteractive apt-get install -y --no-install-recommends "$package" >/dev/null 2>&1 ||
     echo "absent: $package could not be installed; run apt-get install $package for the reason" >&2

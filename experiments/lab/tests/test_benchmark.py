@@ -1,5 +1,7 @@
+import base64
 import collections
 import hashlib
+import io
 import json
 import os
 import pathlib
@@ -8,6 +10,7 @@ import subprocess
 import sys
 import tempfile
 import unittest
+import zipfile
 from unittest import mock
 
 import numpy
@@ -189,10 +192,34 @@ class Rates(unittest.TestCase):
                 rates.differences(folders[0], work)
 
 
+class Corpus(unittest.TestCase):
+    def test_the_size_of_a_package_is_asked_for_once(self):
+        entries = [corpus.Entry("p", "1", name, name * 64, "off", 1, "none") for name in "ab"]
+        said = []
+        with mock.patch.object(corpus, "_package_bytes", return_value=3 * 2**20) as size, \
+                mock.patch.object(corpus, "_download"), mock.patch.object(corpus, "_unpack") as unpack:
+            corpus.fetch(entries, pathlib.Path("absent"), said.append)
+        size.assert_called_once_with("p")
+        unpack.assert_called_once()
+        self.assertEqual(said, ["2 models are in 1 packages: 3 MiB to download", "downloading p, 3 MiB"])
+
+
 class Experiments(unittest.TestCase):
     def test_files_of_the_project(self):
         for file in (ROOT / "experiments/lab/questions").glob("*.toml"):
             self.assertIn("method", benchmark.read_experiment(file))
+
+    def test_the_quick_tier_of_wild_has_one_method_of_six_programs(self):
+        methods = benchmark.read_experiment(ROOT / "experiments/lab/questions/wild.toml")["method"]
+
+        def names(*arguments):
+            return {method["name"] for method in benchmark.select_methods(methods, *arguments)}
+        self.assertEqual(names("quick"), {"hermesh", "OpenVDB", "CGAL alpha wrap", "VTK flying edges",
+                                          "meshoptimizer remesh", "Manifold simplify"})
+        self.assertEqual(names("full"), {method["name"] for method in methods})
+        self.assertEqual(names("quick", ["Blender, voxels", "OpenVDB"]), {"Blender, voxels", "OpenVDB"})
+        with self.assertRaises(LabError):
+            names("full", ["absent"])
 
     def test_methods(self):
         numbers = "".join(f"{key} = 1\n" for key in ("models", "seed", "resolution", "seconds", "memory_mib"))
@@ -201,6 +228,8 @@ class Experiments(unittest.TestCase):
             file = pathlib.Path(work) / "a.toml"
             for method, is_right in (('request = ["a"]', True), ('adapter = ["a"]', True), ("", False),
                                      ('request = ["a"]\nclaims = {watertight = true}', True),
+                                     ('request = ["a"]\ntier = "full"', True),
+                                     ('request = ["a"]\ntier = "quick"', False),
                                      ('request = ["a"]\nadapter = ["a"]', False),
                                      ('adapter = ["a"]\nclaims = {watertight = true}', False)):
                 file.write_text(head + method)
@@ -245,6 +274,10 @@ class Polygons(unittest.TestCase):
                 found, is_triangle = polygons.read(path)
                 numpy.testing.assert_array_equal(found, corners, name)
                 self.assertTrue(is_triangle.all())
+            for name, content in self.scene_files(corners / 2 - 3).items():
+                path = pathlib.Path(work) / name
+                path.write_bytes(content)
+                numpy.testing.assert_allclose(polygons.read(path)[0], corners, err_msg=name)
             path.write_text("solid")
             for wrong in (path, pathlib.Path(work) / "a.off.partial"):
                 wrong.touch()
@@ -255,6 +288,39 @@ class Polygons(unittest.TestCase):
         self.assertEqual(polygons.thin_share(corners, 2.1), 1)
 
 
+    def scene_files(self, corners):
+        """Returns a mesh of half the size, moved by -3, with transforms that restore it, by names of files."""
+        points, order = numpy.unique(corners.reshape(-1, 3), axis=0, return_inverse=True)
+        binary = order.astype("<u2").tobytes() + points.astype("<f4").tobytes()
+        document = {
+            "asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": [1]}],
+            "nodes": [{"mesh": 0, "translation": [3, 3, 3]},
+                      {"children": [0], "matrix": [2, 0, 0, 0, 0, 2, 0, 0, 0, 0, 2, 0, 0, 0, 0, 1]}],
+            "meshes": [{"primitives": [{"attributes": {"POSITION": 1}, "indices": 0},
+                                       {"attributes": {"POSITION": 1}, "mode": 1}]}],  # lines
+            "accessors": [{"bufferView": 0, "componentType": 5123, "count": 36, "type": "SCALAR"},
+                          {"bufferView": 1, "componentType": 5126, "count": 8, "type": "VEC3"}],
+            "bufferViews": [{"buffer": 0, "byteOffset": 0, "byteLength": 72},
+                            {"buffer": 0, "byteOffset": 72, "byteLength": 96}],
+            "buffers": [{"byteLength": len(binary)}]}
+        text = json.dumps(document).encode()
+        length = (20 + len(text) + 8 + len(binary)).to_bytes(4, "little")
+        glb = b"glTF" + b"\2\0\0\0" + length + len(text).to_bytes(4, "little") + b"JSON" + text \
+            + len(binary).to_bytes(4, "little") + b"BIN\0" + binary
+        document["buffers"][0]["uri"] = "data:;base64," + base64.b64encode(binary).decode()
+        vertices = "".join('<vertex x="%g" y="%g" z="%g"/>' % tuple(p) for p in points)
+        triangles = "".join('<triangle v1="%d" v2="%d" v3="%d"/>' % tuple(t) for t in order.reshape(-1, 3))
+        model = f"""<model xmlns="http://schemas.microsoft.com/3dmanufacturing/core/2015/02"><resources>
+            <object id="1"><mesh><vertices>{vertices}</vertices><triangles>{triangles}</triangles></mesh>
+            </object><object id="2"><components>
+            <component objectid="1" transform="1 0 0 0 1 0 0 0 1 3 3 3"/></components></object></resources>
+            <build><item objectid="2" transform="2 0 0 0 2 0 0 0 2 0 0 0"/></build></model>"""
+        archive = io.BytesIO()
+        with zipfile.ZipFile(archive, "w") as out:
+            out.writestr("3D/3dmodel.model", model)
+        return {"a.gltf": json.dumps(document).encode(), "a.glb": glb, "a.3mf": archive.getvalue()}
+
+
 class Solids(unittest.TestCase):
     def setUp(self):
         with tempfile.TemporaryDirectory() as work:
@@ -262,6 +328,22 @@ class Solids(unittest.TestCase):
             for file, text in zip(files, (CUBE, SHIFTED)):
                 file.write_text(text)
             self.cube, self.shifted = (polygons.read(file)[0] for file in files)
+
+    def test_misplaced_volume_of_pieces(self):
+        cube = polygons.solid(self.cube)
+        left = cube * [0.5, 1, 1]
+        halves = [left, left + [1, 0, 0]]
+        middle, quarter = numpy.array([[1.0, 0, 0, 1]]), numpy.array([[1.0, 0, 0, 0.5]])
+        for pieces, planes, expected in (
+                (halves, middle, 0), ([cube], middle, 0.5), ([cube], quarter, 0.25), (halves, quarter, 0.25),
+                (halves, numpy.array([[0.0, 0, 1, 0.5]]), 0.25), ([left], middle, 0.5),
+                (2 * halves, middle, 1), ([cube + [0, 0, 1]], numpy.array([[0.0, 0, 1, -1]]), 1)):
+            self.assertAlmostEqual(polygons.misplaced_share(cube, pieces, planes), expected, delta=0.05)
+        planes = polygons.random_planes(cube, 5, 1)
+        numpy.testing.assert_allclose(numpy.linalg.norm(planes[:, :3], axis=1), 1)
+        sides = cube.reshape(-1, 3) @ planes[:, :3].T - planes[:, 3]
+        self.assertTrue(((sides.min(axis=0) < 0) & (sides.max(axis=0) > 0)).all())
+        numpy.testing.assert_array_equal(planes, polygons.random_planes(cube, 5, 1))
 
     def test_wrong_volume(self):
         self.assertAlmostEqual(abs(polygons.volume(self.shifted)), 8)
@@ -480,8 +562,29 @@ end(claims=dict(watertight=True))"""
         rates.write_report(rows, ["hermesh", "copy"], {"hermesh"}, "Why?", self.work / "out", "combine")
         self.assertIn("of the volume wrong", (self.work / "out/gallery.html").read_text())
 
-    def test_claims_of_requests(self):
+    def test_fractures(self):
+        mkdir = "os.mkdir(request['output']); request['output'] += '/1.ply'; "
+        right = {"name": "hermesh", "claims": {"watertight": True},
+                 "request": ["{hermesh}", "fracture", "{input}", "{output}", "--cutters", "planes:{planes}",
+                             "--voxel-size", "{voxel}", "--no-picture"]}
+        rows = self.run_methods([right, self.adapter("whole", f"{mkdir}write(CUBE); end()"),
+                                 self.adapter("open", f"{mkdir}write(CUBE, 11); end(claims=dict("
+                                              "watertight=True))"),
+                                 self.adapter("twice", f"{mkdir}write(CUBE, 11); request['output'] = "
+                                              "request['output'].replace('1.ply', '2.ply'); write(CUBE, 11); "
+                                              "end()"),
+                                 self.adapter("none", "end()")], task="fracture", resolution=50)
+        self.assertEqual([row["status"] for row in rows], ["done"] * 4 + ["wrong output"])
+        self.assertEqual([row["near"] for row in rates.counted(rows)], [True] + 4 * [False])
+        self.assertEqual(rows[3]["defects"]["boundary_edges"], 2 * rows[2]["defects"]["boundary_edges"])
+        self.assertEqual(rows[2]["failed_claims"], ["watertight"])
+        self.assertGreater(rows[0]["pieces"], 2)
+        self.assertLess(rows[1]["volume_error"], 1e-6)  # only the planes reveal that it is not cut
+        self.assertAlmostEqual(rows[0]["volume"], 8, delta=0.08)
+        rates.write_report(rows, ["hermesh", "whole"], {"hermesh"}, "Why?", self.work / "out", "fracture")
+        self.assertIn("of the volume wrong", (self.work / "out/gallery.html").read_text())
 
+    def test_claims_of_requests(self):
         request = ["{hermesh}", "remesh", "{input}", "{output}", "--voxel-size", "{voxel}"]
         claims = {"watertight": True, "distance_to_input": "{voxel}"}
         row, = self.run_methods([{"name": "remesh", "request": request, "claims": claims}])

@@ -104,6 +104,21 @@ class Children(Runs):
         self.assertEqual(self.run_toys("--memory", 200), 1)
         self.assertEqual(outcome(self.rows()[1]), "took more than 200 MiB of memory")
 
+    def test_children_of_a_run_without_network_do_not_download(self):
+        self.write("good")
+        seen = []
+        run_group = driver.Run._run_group
+        for before in None, "", "1":
+            with mock.patch.dict(os.environ, HERMESH_OFFLINE=before or ""), \
+                    mock.patch("experiments.lab.models.fetch", return_value="no network"), \
+                    mock.patch.object(driver.Run, "_run_group", lambda run, group: (
+                        seen.append(os.environ["HERMESH_OFFLINE"]), run_group(run, group))[1]):
+                if before is None:
+                    del os.environ["HERMESH_OFFLINE"]
+                self.run_toys("--again")
+                self.assertEqual(os.environ.get("HERMESH_OFFLINE"), before)
+        self.assertEqual(seen, ["no network", "no network", "1"])
+
     def test_descendants_are_ended_with_the_child(self):
         self.write("forking")
         with mock.patch.dict(os.environ, TOY_PID=str(self.root / "pid")):

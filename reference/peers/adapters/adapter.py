@@ -159,9 +159,9 @@ def with_arrays(remesh, **claims):
 
 
 def with_files(request, command, refusal=None, **claims):
-    """Runs a peer whose arguments contain IN.obj or IN.ply, OUT.obj, and SECOND.obj if there are two inputs,
-    and which may print its seconds. A message that contains the text `refusal` means that the program refuses
-    the input.
+    """Runs a peer whose arguments contain IN.obj or IN.ply, OUT.obj or OUT (the directory of the output), and
+    SECOND.obj if there are two inputs, and which may print its seconds. A message that contains the text
+    `refusal` means that the program refuses the input.
     """
     points, triangles = read_mesh(request["input"])
     with tempfile.TemporaryDirectory() as work:
@@ -172,6 +172,9 @@ def with_files(request, command, refusal=None, **claims):
             peer.write_obj(names["IN.obj"], points, triangles)
         if "SECOND.obj" in command:
             peer.write_obj(names["SECOND.obj"], *read_mesh(request["second"]))
+        if "OUT" in command:
+            names["OUT"] = names["OUT.obj"] = request["output"]
+            os.mkdir(request["output"])
         words = [names.get(word, str(word)) for word in command]
         done = subprocess.run(words, capture_output=True, text=True, errors="replace")
         if refusal and refusal in done.stderr:
@@ -179,8 +182,11 @@ def with_files(request, command, refusal=None, **claims):
         if done.returncode or not os.path.exists(names["OUT.obj"]):
             fail_like(done)
         seconds = [line.split()[1] for line in done.stdout.splitlines() if line.startswith("seconds ")]
+        seconds = float(seconds[-1]) if seconds else None
+        if "OUT" in command:
+            return {"seconds": seconds, "claims": claims}
         points, triangles = peer.read_obj(names["OUT.obj"])
-    return save(request, points, [triangles], float(seconds[-1]) if seconds else None, claims)
+    return save(request, points, [triangles], seconds, claims)
 
 
 def run(work):
