@@ -92,7 +92,6 @@ TEST_F(BadInputTest, VoxelSize) {
   for (const char* bad : {"0", "-0.1", "nan", "-inf", "small", ""})
     refuse({"--voxel-size", bad}, "--voxel-size");
   for (const char* bad : {"0", "-5", "2.5", "many"}) refuse({"--resolution", bad}, "--resolution");
-  refuse({}, "--voxel-size");
   refuse("--voxel-size 0.1 --resolution 10", "--resolution");
   for (const char* band : {"--exterior-band", "--interior-band"})
     for (const char* bad : {"0", "-3", "nan"}) refuse({"--resolution", "10", band, bad}, band);

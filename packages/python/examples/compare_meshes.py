@@ -28,10 +28,10 @@ for name, mesh in meshes.items():
 
 # Without models it prints
 #   mesh                       triangles  to the part [voxels]  from the part [voxels]  watertight  solid
-#   marching cubes                 66652  0.664 to 0.672         1.154 to 1.169           True        same
-#   manifold dual contouring        1282  0.111 to 0.125         0.114 to 0.128           True        same
+#   marching cubes                 67560  0.664 to 0.672         1.155 to 1.170           True        same
+#   manifold dual contouring        1176  0.107 to 0.121         0.112 to 0.126           True        same
 
 # With that of $HERMESH_DATA it prints
 #   mesh                       triangles  to the part [voxels]  from the part [voxels]  watertight  solid
 #   marching cubes                 51080  0.579 to 0.584         0.858 to 0.873           True        same
-#   manifold dual contouring         528  0.208 to 0.222         0.103 to 0.117           True        same
+#   manifold dual contouring         496  0.180 to 0.192         0.098 to 0.113           True        same
