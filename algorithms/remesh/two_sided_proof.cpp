@@ -47,13 +47,26 @@ std::span<const std::int8_t> TwoSidedProof::turns() const {
                   : std::span<const std::int8_t>();
 }
 
-bool TwoSidedProof::bounds_nothing(const std::array<Eigen::Vector3d, 3>& piece) const {
-  const Eigen::Vector3d normal = (piece[1] - piece[0]).cross(piece[2] - piece[0]).normalized();
-  if (!normal.allFinite() || normal.isZero()) return true;  // it has no area
-  const Eigen::Vector3d middle = (piece[0] + piece[1] + piece[2]) / 3.0, step = rounding_ * normal;
-  const bool before = winding_->number().at(middle + step) > 0.5,
-             behind = winding_->number().at(middle - step) > 0.5;
-  return before == behind && (before || !keeps_open_);
+void TwoSidedProof::bound_nothing(std::span<const Corners> pieces, std::span<std::uint8_t> results) const {
+  std::vector<Eigen::Vector3d> points;  // two for each piece that has an area
+  for (std::size_t i = 0; i < pieces.size(); ++i) {
+    const Corners& piece = pieces[i];
+    const Eigen::Vector3d normal = (piece[1] - piece[0]).cross(piece[2] - piece[0]).normalized();
+    const bool has_area = normal.allFinite() && !normal.isZero();
+    results[i] = !has_area;
+    if (!has_area) continue;
+    const Eigen::Vector3d middle = (piece[0] + piece[1] + piece[2]) / 3.0, step = rounding_ * normal;
+    points.push_back(middle + step);
+    points.push_back(middle - step);
+  }
+  std::vector<float> numbers(points.size());
+  winding_->number().at(points, numbers);
+  for (std::size_t i = 0, next = 0; i < pieces.size(); ++i) {
+    if (results[i]) continue;
+    const bool before = numbers[next] > 0.5f, behind = numbers[next + 1] > 0.5f;
+    results[i] = before == behind && (before || !keeps_open_);
+    next += 2;
+  }
 }
 
 bool TwoSidedProof::bounds_nothing(const SolidSurface& surface, const Far& at) const {
@@ -76,7 +89,9 @@ TwoSidedDistance TwoSidedProof::compare(std::span<const Eigen::Vector3f> points,
                                         const RunContext& context) const {
   FreePieces free;
   if (winding_)
-    free = {.is_free = [this](const std::array<Eigen::Vector3d, 3>& piece) { return bounds_nothing(piece); },
+    free = {.is_free = [this](const Corners& piece) { return bounds_nothing(piece); },
+            .are_free = [this](std::span<const Corners> pieces,
+                               std::span<std::uint8_t> results) { bound_nothing(pieces, results); },
             .radius = kFreePiece * error_};
   const auto hold = [&](const SurfaceDistance& other, std::span<const Eigen::Vector3f> of,
                         const Eigen::Vector3d& shift, const std::vector<Triangle>& held,

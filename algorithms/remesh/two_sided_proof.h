@@ -3,6 +3,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <array>
 #include <cstdint>
 #include <optional>
 #include <span>
@@ -78,7 +79,14 @@ class TwoSidedProof {
                            bool lists_pieces, const RunContext& context) const;
 
  private:
-  bool bounds_nothing(const std::array<Eigen::Vector3d, 3>& piece) const;
+  using Corners = std::array<Eigen::Vector3d, 3>;
+  bool bounds_nothing(const Corners& piece) const {
+    std::uint8_t result = 0;
+    bound_nothing(std::span(&piece, 1), std::span(&result, 1));
+    return result;
+  }
+  /// Sets a result for each piece; pieces near each other take a small part of the time.
+  void bound_nothing(std::span<const Corners> pieces, std::span<std::uint8_t> results) const;
   DistanceFromSurface smallest_bound(const SurfaceDistance& to, std::span<const Eigen::Vector3f> points,
                                      const Eigen::Vector3d& offset, std::vector<Triangle> triangles,
                                      const FreePieces& free, bool lists_pieces,

@@ -37,7 +37,10 @@ struct FreePieces {
   /// Returns true if a piece that is farther away than the limit is accepted; called from several threads.
   /// Null: none is.
   std::function<bool(const std::array<Eigen::Vector3d, 3>& piece)> is_free = {};
-  /// Largest radius of the pieces passed to `is_free`, about their middle.
+  /// Does the same for pieces near each other, and sets a result for each. Null: calls is_free for each.
+  std::function<void(std::span<const std::array<Eigen::Vector3d, 3>> pieces, std::span<std::uint8_t> results)>
+      are_free = {};
+  /// Largest radius of the pieces that are accepted, about their middle.
   double radius = 0.0;
 };
 
