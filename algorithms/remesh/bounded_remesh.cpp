@@ -58,6 +58,8 @@ constexpr double kBytesOfPoint = 400.0;
 /// Number of times that tolerances are lowered before voxels are made smaller, and their factor.
 constexpr int kLowerings = 3;
 constexpr float kLowering = 0.4f;
+/// Largest voxels with shells within the error, in errors: shells are at most about 1.75 voxels away.
+constexpr double kShellVoxel = 0.5;
 /// Share of the excepted area from which on smaller voxels are not worth another attempt; and, in errors, the
 /// radius of the balls around exceptions, except for single larger pieces, and the distance from them within
 /// which collapses may cause others.
@@ -156,7 +158,11 @@ class BoundedRemesher {
     result_ = refused;
     result_.unmet.clear();
     double before = std::numeric_limits<double>::infinity();
-    for (double voxel_size = tried_;; voxel_size = std::max(kFinerBetween * voxel_size, smallest_voxel())) {
+    // All shells around thin parts of larger voxels are far, and comparing them takes most of the time.
+    const double first = options_.thin == ThinRule::keep
+                             ? std::min(tried_, std::max(kShellVoxel * options_.error, smallest_voxel()))
+                             : tried_;
+    for (double voxel_size = first;; voxel_size = std::max(kFinerBetween * voxel_size, smallest_voxel())) {
       context_.notes.resize(notes);
       const std::optional<Attempt> made = attempt(voxel_size);
       const bool is_last = voxel_size <= smallest_voxel();
