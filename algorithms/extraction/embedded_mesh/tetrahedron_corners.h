@@ -23,8 +23,7 @@ namespace hermesh {
 class TetrahedronCorners {
  public:
   /// All corners are lattice points. @param cells must outlive this
-  explicit TetrahedronCorners(const CellBlocks& cells)
-      : cells_(cells), near_face_(cells.size()), has_moved_(cells.size()) {}
+  explicit TetrahedronCorners(const CellBlocks& cells) : cells_(cells), has_moved_(cells.size()) {}
 
   /// Moves the corners of cells whose vertices have a target near a face. `targets` are by block, ascending
   /// by cell, and must outlive this.
@@ -42,8 +41,7 @@ class TetrahedronCorners {
  private:
   const CellBlocks& cells_;
   const std::vector<std::vector<PointTarget>>* targets_ = nullptr;
-  ByBlock<BlockMask> near_face_;         ///< corners of cells with a target near a face
-  std::vector<std::uint8_t> has_moved_;  ///< by block: 1 if it or a neighbour has such a corner
+  std::vector<std::uint8_t> has_moved_;  ///< by block: 1 if it or a neighbour has a target
 };
 
 }  // namespace hermesh
