@@ -311,7 +311,7 @@ class DomainCollapses {
     return is;
   }
 
-  /// Returns true if a triangle, of twice the area `size`, is no higher than kFlat.
+  /// Returns true if the height of a triangle is at most kFlat. @param size twice its area
   static bool is_flat(double size, const Corners& c) {
     const double longest =
         std::max({(c[1] - c[0]).squaredNorm(), (c[2] - c[1]).squaredNorm(), (c[0] - c[2]).squaredNorm()});

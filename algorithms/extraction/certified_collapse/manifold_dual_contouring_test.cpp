@@ -162,8 +162,8 @@ TEST(ManifoldDualContouring, NoVertexIsBeyondACornerOfATurnedCube) {
                     .matrix();
     const FloatHermite hermite = cube.hermite();
     const PolygonMesh fine = contour(hermite, 0.0), coarse = contour(hermite, 0.1);
-    // 1/1024 voxel where vertices cannot move to the faces of their cells, and more inwards where a vertex beside
-    // a crease has no room on it.
+    // Vertices that cannot move to the faces of their cells are 1/1024 voxel off, and those that have no room
+    // on a crease are farther inside.
     std::size_t inside = 0;
     for (std::size_t p = 0; p < fine.points.size(); ++p) {
       const double place = (cube.turn.transpose() * fine.world(p)).cwiseAbs().maxCoeff();

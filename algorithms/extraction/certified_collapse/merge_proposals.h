@@ -57,9 +57,9 @@ void propose_relaxation(MergeForest& forest, const MergedMesh& merged, const Dec
                         int sweeps, const RunContext& context);
 
 /// Moves vertices of the mesh of the settled `forest` to the nearest vertex of the fine mesh that they
-/// represent, if it is within a fiftieth of a voxel: sums in single precision place the corner of a
-/// polyhedron up to a thousandth of a voxel beside the fine vertex, which is exact. @param merged that mesh,
-/// or one before further collapses
+/// represent, if it is within a fiftieth of a voxel: sums in single precision are off by up to a thousandth
+/// of a voxel at the corner of a polyhedron, where the fine vertex is exact.
+/// @param merged that mesh, or one before further collapses
 void propose_members(MergeForest& forest, const MergedMesh& merged, const DecimationInput& input,
                      const RunContext& context);
 
