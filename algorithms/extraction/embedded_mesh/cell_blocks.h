@@ -47,6 +47,11 @@ class ByBlock {
   std::vector<std::unique_ptr<T>> made_;
 };
 
+inline void set_bit(BlockMask& mask, int sample, bool value = true) {
+  const std::uint64_t bit = std::uint64_t{1} << (sample & 63);
+  mask[sample >> 6] = value ? mask[sample >> 6] | bit : mask[sample >> 6] & ~bit;
+}
+
 /// The cells of a block whose sheets differ from kCellSheets, with their sheets; ascending by cell.
 using SheetsOfBlock = std::vector<std::pair<std::uint16_t, CellSheets>>;
 

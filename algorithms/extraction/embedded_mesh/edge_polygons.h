@@ -17,11 +17,6 @@ namespace hermesh {
 /// A set of edges of a lattice: by block and axis, one bit per first sample.
 using EdgeMasks = ByBlock<std::array<BlockMask, 3>>;
 
-inline void set_bit(BlockMask& mask, int sample, bool value = true) {
-  const std::uint64_t bit = std::uint64_t{1} << (sample & 63);
-  mask[sample >> 6] = value ? mask[sample >> 6] | bit : mask[sample >> 6] & ~bit;
-}
-
 /// The vertices of the plain cells in and just below a block, looked up once for all of its edges. One object
 /// serves many blocks in turn.
 class PlainPoints {

@@ -8,16 +8,30 @@ namespace hermesh {
 void TetrahedronCorners::move(const std::vector<std::vector<PointTarget>>& targets) {
   targets_ = &targets;
   for (std::size_t b = 0; b < targets.size(); ++b) {
-    if (targets[b].empty()) continue;
-    for (const std::int32_t there : cells_.source(static_cast<std::int32_t>(b)).neighbours)
-      if (there >= 0) has_moved_[there] = 1;
-    has_moved_[b] = 1;
+    const auto block = static_cast<std::int32_t>(b);
+    for (const PointTarget& target : targets[b]) {
+      const Eigen::Vector3d from_plane = target.place - target.place.array().round().matrix();
+      if (from_plane.cwiseAbs().minCoeff() > cells_.margin()) continue;
+      has_moved_[b] = 1;
+      for (const std::int32_t there : cells_.source(block).neighbours)
+        if (there >= 0) has_moved_[there] = 1;
+      for (int i = 0; i < 8; ++i) {
+        const std::array<int, 3> step = corner_offset(i);
+        const CellBlocks::Cell sample =
+            cells_.locate(block, (target.cell >> 6) + step[0], ((target.cell >> 3) & 7) + step[1],
+                          (target.cell & 7) + step[2]);
+        if (sample.block >= 0) set_bit(near_face_.at(sample.block), sample.cell);
+      }
+    }
   }
 }
 
 Eigen::Vector3d TetrahedronCorners::at(std::int32_t block, int x, int y, int z) const {
   const Eigen::Vector3d corner = cells_.corner(block, 0) + Eigen::Vector3d(x, y, z);
   if (!has_moved(block)) return corner;
+  // Samples outside of all blocks are not marked: nothing about them is known.
+  const CellBlocks::Cell sample = cells_.locate(block, x, y, z);
+  if (sample.block >= 0 && !test(near_face_[sample.block], sample.cell)) return corner;
   std::array<CellBlocks::Cell, 8> around;
   Eigen::Vector3i away = Eigen::Vector3i::Zero();
   for (int i = 0; i < 8; ++i) {

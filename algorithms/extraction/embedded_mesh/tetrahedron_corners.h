@@ -23,7 +23,8 @@ namespace hermesh {
 class TetrahedronCorners {
  public:
   /// All corners are lattice points. @param cells must outlive this
-  explicit TetrahedronCorners(const CellBlocks& cells) : cells_(cells), has_moved_(cells.size()) {}
+  explicit TetrahedronCorners(const CellBlocks& cells)
+      : cells_(cells), near_face_(cells.size()), has_moved_(cells.size()) {}
 
   /// Moves the corners of cells whose vertices have a target near a face. `targets` are by block, ascending
   /// by cell, and must outlive this.
@@ -41,7 +42,8 @@ class TetrahedronCorners {
  private:
   const CellBlocks& cells_;
   const std::vector<std::vector<PointTarget>>* targets_ = nullptr;
-  std::vector<std::uint8_t> has_moved_;  ///< by block: 1 if it or a neighbour has a target
+  ByBlock<BlockMask> near_face_;         ///< samples at cells whose target is near a plane of the lattice
+  std::vector<std::uint8_t> has_moved_;  ///< by block: 1 if it or a neighbour has such a cell
 };
 
 }  // namespace hermesh
