@@ -2,18 +2,15 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <functional>
 #include <limits>
-#include <map>
 #include <memory>
 #include <numeric>
 #include <optional>
 #include <utility>
 
 #include "algorithms/core/level_set_grid.h"
-#include "algorithms/core/number_text.h"
 #include "algorithms/core/parallel.h"
 #include "algorithms/core/run_context.h"
 #include "algorithms/extraction/certified_collapse/certified_decimation.h"
@@ -22,6 +19,7 @@
 #include "algorithms/hermite/hermite_view.h"
 #include "algorithms/hermite/samplers.h"
 #include "algorithms/lattice/memory_estimate.h"
+#include "algorithms/remesh/exception_balls.h"
 #include "algorithms/remesh/two_sided_proof.h"
 #include "algorithms/remesh/voxel_size.h"
 #include "algorithms/voxelization/voxelize.h"
@@ -60,10 +58,8 @@ constexpr int kLowerings = 3;
 constexpr float kLowering = 0.4f;
 /// Largest voxels with shells within the error, in errors: shells are at most about 1.75 voxels away.
 constexpr double kShellVoxel = 0.5;
-/// Share of the excepted area from which on smaller voxels are not worth another attempt; and, in errors, the
-/// radius of the balls around exceptions, except for single larger pieces, and the distance from them within
-/// which collapses may cause others.
-constexpr double kWorthFiner = 0.75, kBall = 4.0, kAroundBall = 0.5;
+/// Share of the excepted area from which on smaller voxels are not worth another attempt.
+constexpr double kWorthFiner = 0.75;
 
 /// A mesh to collapse, first the uniform one at a voxel size, and the surface that it approximates.
 struct Attempt {
@@ -82,50 +78,6 @@ struct Attempt {
                    [&](const auto& p) { return file.in_file(p); });
     return result;
   }
-};
-
-/// Balls that contain far pieces.
-class Balls {
- public:
-  /// Makes balls that contain all pieces, each around the farthest piece that no earlier one contains.
-  Balls(std::vector<Far> pieces, double error) : error_(error) {
-    std::ranges::stable_sort(pieces, std::greater<>(), &Far::distance);
-    for (const Far& piece : pieces) {
-      UnmetPlace* ball = find(piece, [&](const UnmetPlace&) { return kBall * error_; });
-      if (!ball) {
-        cells_[cell_of(piece, 13)].push_back(balls_.size());
-        ball = &balls_.emplace_back(Unmet::thin, piece.place, piece.distance);
-      }
-      ball->radius = std::max(ball->radius, (piece.place - ball->place).norm() + piece.radius);
-      ball->area += piece.area;
-    }
-  }
-
-  /// Returns true if a ball contains a piece or nearly so.
-  bool nearly_contain(const Far& piece) {
-    return find(piece, [&](const UnmetPlace& ball) { return ball.radius + kAroundBall * error_; });
-  }
-  std::vector<UnmetPlace> list() && { return std::move(balls_); }
-
- private:
-  /// Returns a ball that contains a piece if it has the radius `radius(ball)`; null if there is none.
-  template <class F>
-  UnmetPlace* find(const Far& piece, const F& radius) {
-    for (int n = 0; n < 27; ++n)
-      if (const auto found = cells_.find(cell_of(piece, n)); found != cells_.end())
-        for (const std::size_t i : found->second)
-          if ((piece.place - balls_[i].place).norm() + piece.radius <= radius(balls_[i])) return &balls_[i];
-    return nullptr;
-  }
-  /// Returns one of the 27 cells around a piece, the middle one for 13.
-  std::array<int, 3> cell_of(const Far& piece, int n) const {
-    const Eigen::Vector3d at = (piece.place / ((kBall + kAroundBall) * error_)).array().floor();
-    return {int(at.x()) + n / 9 - 1, int(at.y()) + n / 3 % 3 - 1, int(at.z()) + n % 3 - 1};
-  }
-
-  double error_;
-  std::vector<UnmetPlace> balls_;
-  std::map<std::array<int, 3>, std::vector<std::size_t>> cells_;  ///< numbers of balls by their centres' cell
 };
 
 class BoundedRemesher {
@@ -531,7 +483,7 @@ class BoundedRemesher {
     result_.from_surface = proved.from_surface;
     result_.free_area = proved.free_area;
     if (!excepted_) return std::move(proved.far);
-    result_.excepted = Balls(proved.far, options_.error).list();
+    result_.excepted = ExceptionBalls(proved.far, options_.error).list();
     std::erase_if(proved.far, [&](const Far& piece) { return excepted_->nearly_contain(piece); });
     return std::move(proved.far);
   }
@@ -610,8 +562,9 @@ class BoundedRemesher {
   const double longest_;  ///< side of the input's box, world units
   const TwoSidedProof proof_;
   double area_ = 0.0;
-  double tried_ = 0.0;             ///< voxel size of the last attempt
-  std::optional<Balls> excepted_;  ///< exceptions of the uniform mesh; none: exceptions are not permitted
+  double tried_ = 0.0;  ///< voxel size of the last attempt
+  std::optional<ExceptionBalls>
+      excepted_;  ///< exceptions of the uniform mesh; none: exceptions are not permitted
   std::shared_ptr<const SolidSurface> surface_;  ///< of the last attempt
   BoundedMesh result_;
 };
@@ -639,74 +592,6 @@ BoundedMesh bounded_remesh(const PolygonMesh& mesh, const BoundedRemeshOptions& 
   if (made.unmet.empty() || !options.except_thin) return made;
   context.notes.resize(notes);
   return remesher.run_with_exceptions(std::move(made));
-}
-
-double BoundedMesh::excepted_area() const {
-  return std::transform_reduce(excepted.begin(), excepted.end(), 0.0, std::plus<>(),
-                               [](const UnmetPlace& ball) { return ball.area; });
-}
-
-std::vector<std::string> notes(const BoundedMesh& made) {
-  const auto counted = [](std::size_t n, const std::string& what) {
-    return std::to_string(n) + " " + what + (n == 1 ? "" : "s");
-  };
-  std::vector<std::string> result;
-  if (made.free_area > 0.0)
-    result.push_back("polygons of " + text(made.free_area) +
-                     " in all, as area, have the same on both sides, by winding numbers at places a 16th of "
-                     "the error apart, "
-                     "and were taken to bound nothing");
-  if (made.hole_area > 0.0 && made.over_holes)
-    result.push_back("holes of " + text(made.hole_area) +
-                     " in all, as area, were closed, where the bound is to the surface on which the winding "
-                     "number is 1/2");
-  if (!made.excepted.empty()) {
-    const auto largest = std::ranges::max_element(made.excepted, {}, &UnmetPlace::radius);
-    const UnmetPlace& farthest = made.excepted.front();
-    result.push_back("the bound does NOT hold at " + counted(made.excepted.size(), "place") +
-                     " (holes, walls or gaps too thin for the voxels), the largest within " +
-                     text(largest->radius) + " of " + text(largest->place) + ": polygons and mesh of " +
-                     text(made.excepted_area()) +
-                     " in all, as area, are not shown to be near, and the surfaces are at least " +
-                     text(farthest.distance) + " apart at " + text(farthest.place));
-  }
-  const Topology& before = made.topology;
-  const Topology after = topology_of(made.mesh.points, made.mesh.triangles);
-  if (after.components != before.components)
-    result.push_back("the mesh has " + counted(after.components, "component") +
-                     " and the polygons that bound the solid have " +
-                     counted(before.components, "connected part") + ": " +
-                     (after.components > before.components
-                          ? "thin walls came apart or gaps were closed within the error"
-                          : "parts were lost, or joined to others that they touch or nearly touch"));
-  if (before.genus && after.genus != before.genus)
-    result.push_back("the mesh has the genus " + std::to_string(*after.genus) +
-                     " and the polygons that bound the solid have " + std::to_string(*before.genus) +
-                     ": handles or tunnels were added or lost within the error");
-  return result;
-}
-
-std::string explanation(const BoundedMesh& refused) {
-  const UnmetPlace& first = refused.unmet.front();
-  const std::string at =
-      "the error of " + text(refused.error) + " is not kept at " + text(first.place) + ": ";
-  const std::string distance = std::isfinite(first.distance)
-                                   ? " the surfaces are at least " + text(first.distance) + " apart there"
-                                   : std::string(" nothing of the polygons shows");
-  switch (first.why) {
-    case Unmet::hole:
-      return at + "the polygons have a hole there, which has to be closed;" + distance +
-             "; give --over-holes to let the bound hold elsewhere, or --except-thin to except this place";
-    case Unmet::thin:
-      break;
-  }
-  const std::string what = refused.thickness > 0.0 ? "a wall or gap of " + text(refused.thickness) +
-                                                         " there is too thin for voxels of "
-                                                   : "something there is too small for voxels of ";
-  return at + what + text(refused.voxel_size) + ", the smallest that may be;" + distance +
-         "; raise the error, allow smaller ones with --smallest-voxel and --limit-points, or except such "
-         "places "
-         "with --except-thin";
 }
 
 }  // namespace hermesh

@@ -413,6 +413,17 @@ TEST(BoundedRemesh, RefusesWhatHasNoBound) {
   EXPECT_THROW(remesh(flat, {.error = 0.1}), Error);
 }
 
+TEST(BoundedRemesh, NotesNoGenusOfAMeshThatTouchesItself) {
+  // Two boxes with a common edge, whose four polygons leave the genus of the mesh undefined.
+  BoundedMesh made;
+  made.mesh = box(Vector3d(0, 0, 0), Vector3d(1, 1, 1));
+  made.topology = topology_of(made.mesh.points, made.mesh.triangles);
+  EXPECT_EQ(made.topology.genus, 0);
+  append(made.mesh, box(Vector3d(1, 1, 0), Vector3d(2, 2, 1)));
+  EXPECT_FALSE(topology_of(made.mesh.points, made.mesh.triangles).genus);
+  EXPECT_TRUE(notes(made).empty());  // by the vertices of the edge they are one component
+}
+
 TEST(BoundedRemesh, SameBytesAtAnyThreadCount) {
   const PolygonMesh polygons = sphere(Vector3d(0.3, 0.2, 0.1), 1.0, 24);
   std::vector<PolygonMesh> made;

@@ -72,14 +72,16 @@ void TwoSidedProof::bound_nothing(std::span<const Corners> pieces, std::span<std
 bool TwoSidedProof::bounds_nothing(const SolidSurface& surface, const Far& at) const {
   if (!winding_) return false;
   const Triangle& t = surface.triangles[at.triangle];
-  std::array<Eigen::Vector3d, 3> piece;
+  Corners piece;
   for (int i = 0; i < 3; ++i) {
     const Eigen::Vector3d from_corner = surface.points[t[i]].cast<double>() - at.place;
     // Normals mean nothing on the triangle's edges, so a small piece next to the corner is tested.
     piece[i] =
         at.place + std::min(1.0, kFreePiece * error_ / std::max(from_corner.norm(), 1e-300)) * from_corner;
   }
-  return bounds_nothing(piece);
+  std::uint8_t result = 0;
+  bound_nothing(std::span(&piece, 1), std::span(&result, 1));
+  return result;
 }
 
 TwoSidedDistance TwoSidedProof::compare(std::span<const Eigen::Vector3f> points,
@@ -89,8 +91,7 @@ TwoSidedDistance TwoSidedProof::compare(std::span<const Eigen::Vector3f> points,
                                         const RunContext& context) const {
   FreePieces free;
   if (winding_)
-    free = {.is_free = [this](const Corners& piece) { return bounds_nothing(piece); },
-            .are_free = [this](std::span<const Corners> pieces,
+    free = {.are_free = [this](std::span<const Corners> pieces,
                                std::span<std::uint8_t> results) { bound_nothing(pieces, results); },
             .radius = kFreePiece * error_};
   const auto hold = [&](const SurfaceDistance& other, std::span<const Eigen::Vector3f> of,

@@ -80,12 +80,7 @@ class TwoSidedProof {
 
  private:
   using Corners = std::array<Eigen::Vector3d, 3>;
-  bool bounds_nothing(const Corners& piece) const {
-    std::uint8_t result = 0;
-    bound_nothing(std::span(&piece, 1), std::span(&result, 1));
-    return result;
-  }
-  /// Sets a result for each piece; pieces near each other take a small part of the time.
+  /// Sets a result for each of some pieces near each other: 1 if it bounds nothing.
   void bound_nothing(std::span<const Corners> pieces, std::span<std::uint8_t> results) const;
   DistanceFromSurface smallest_bound(const SurfaceDistance& to, std::span<const Eigen::Vector3f> points,
                                      const Eigen::Vector3d& offset, std::vector<Triangle> triangles,

@@ -91,19 +91,19 @@ class SurfaceDistance::Walk {
         return 0.5 * (piece.corners[1] - piece.corners[0]).cross(piece.corners[2] - piece.corners[0]).norm();
       };
       // The last pieces between near and free parts are a little too far, though their middles are not.
-      if (free_.is_free && (is_last || (is_far && radius <= free_.radius)) && is_free(piece.corners)) {
+      if (free_.are_free && (is_last || (is_far && radius <= free_.radius)) && is_free(piece.corners)) {
         result.free_area += piece_area();
         continue;
       }
       // A piece that is certainly far may still contain free pieces.
       const bool may_be_listed = is_far && lists && radius <= kLargestListed * limit_,
-                 is_middle_free = may_be_listed && !is_last && free_.is_free && is_free(piece.corners);
+                 is_middle_free = may_be_listed && !is_last && free_.are_free && is_free(piece.corners);
       if (is_middle_free && distance > limit_ + radius) {
         list_all_but_free(piece.corners, radius, number, distance, result);
         continue;
       }
       if (is_last || (may_be_listed && !is_middle_free) ||
-          (is_far && !lists && (!free_.is_free || radius <= free_.radius))) {
+          (is_far && !lists && (!free_.are_free || radius <= free_.radius))) {
         result.far.push_back({number, middle - offset_, distance, radius, piece_area()});
         if (!lists) return;
         continue;
@@ -168,7 +168,9 @@ class SurfaceDistance::Walk {
 
   bool is_free(Corners piece) const {
     for (Eigen::Vector3d& p : piece) p -= offset_;
-    return free_.is_free(piece);
+    std::uint8_t result = 0;
+    free_.are_free(std::span(&piece, 1), std::span(&result, 1));
+    return result;
   }
 
   /// Lists those parts of a far piece that are not free, as pieces no larger than the largest that may be
@@ -185,10 +187,7 @@ class SurfaceDistance::Walk {
         if (i + j + 1 < n) parts_.push_back({b, b + v, c});
       }
     are_free_.assign(parts_.size(), 0);
-    if (free_.are_free)
-      free_.are_free(parts_, are_free_);
-    else
-      std::ranges::transform(parts_, are_free_.begin(), free_.is_free);
+    free_.are_free(parts_, are_free_);
     const double area = 0.5 * u.cross(v).norm();
     for (std::size_t i = 0; i < parts_.size(); ++i) {
       if (are_free_[i]) {

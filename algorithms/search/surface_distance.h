@@ -34,10 +34,8 @@ struct DistanceFromSurface {
 
 /// Parts of the tested triangles that need not be near.
 struct FreePieces {
-  /// Returns true if a piece that is farther away than the limit is accepted; called from several threads.
-  /// Null: none is.
-  std::function<bool(const std::array<Eigen::Vector3d, 3>& piece)> is_free = {};
-  /// Does the same for pieces near each other, and sets a result for each. Null: calls is_free for each.
+  /// Sets a result for each of some pieces near each other: 1 if it is accepted although it is farther away
+  /// than the limit. Called from several threads. Null: none is accepted.
   std::function<void(std::span<const std::array<Eigen::Vector3d, 3>> pieces, std::span<std::uint8_t> results)>
       are_free = {};
   /// Largest radius of the pieces that are accepted, about their middle.

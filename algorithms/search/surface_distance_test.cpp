@@ -140,9 +140,13 @@ TEST(SurfaceDistance, FreePiecesNeedNotBeNear) {
              to{{{0, 0, 0}, {0.5f, 0, 0}, {0.5f, 1, 0}, {0, 1, 0}}, {{0, 1, 2}, {0, 2, 3}}};
   FreePieces free;
   free.radius = 0.01;
-  free.is_free = [](const std::array<Vector3d, 3>& piece) {
-    return piece[0].x() + piece[1].x() + piece[2].x() > 1.5;
+  const auto accept = [&](auto is_free) {
+    free.are_free = [is_free](std::span<const std::array<Vector3d, 3>> pieces,
+                              std::span<std::uint8_t> results) {
+      std::ranges::transform(pieces, results.begin(), is_free);
+    };
   };
+  accept([](const auto& piece) { return piece[0].x() + piece[1].x() + piece[2].x() > 1.5; });
   const DistanceFromSurface found = hold(from, to, 0.1, Vector3d::Zero(), free);
   EXPECT_TRUE(found.far.empty());
   EXPECT_NEAR(found.free_area, 0.4, 0.02);  // the part farther than a tenth from the half
@@ -150,12 +154,12 @@ TEST(SurfaceDistance, FreePiecesNeedNotBeNear) {
   // limit.
   const Soup slanted{{{0.03f, 0.02f, 0.01f}, {0.97f, 0.41f, 0.3f}, {0.33f, 0.99f, 0.5f}}, {{0, 1, 2}}},
       corner{{{0, 0, 0}, {0.4f, 0, 0}, {0.4f, 0.3f, 0}}, {{0, 1, 2}}};
-  free.is_free = [](const std::array<Vector3d, 3>&) { return true; };
+  accept([](const auto&) { return true; });
   for (const double limit : {0.05, 0.1, 0.1003, 0.1234}) {
     EXPECT_TRUE(hold(from, to, limit, Vector3d::Zero(), free).far.empty()) << limit;
     EXPECT_TRUE(hold(slanted, corner, limit, Vector3d::Zero(), free).far.empty()) << limit;
   }
-  free.is_free = [](const std::array<Vector3d, 3>&) { return false; };
+  accept([](const auto&) { return false; });
   EXPECT_EQ(hold(from, to, 0.1, Vector3d::Zero(), free).far.size(), 2u);
 }
 

@@ -57,7 +57,7 @@
 // lattice points, so the corners are moved a little (tetrahedron_corners.h).
 //
 // Vertices that the tetrahedra confine to their cells, but whose targets are outside, are moved afterwards,
-// one by one, if a test of the current mesh finds no intersection (move_points() in tested_polygons.h).
+// one by one, if a test of the current mesh finds no intersection (late_moves.h).
 //
 // The argument does not depend on what lies on the two sides of a crossed edge, so it also holds for a
 // lattice whose inside is divided into pieces (cell_blocks.h): the polygons of all pieces together, with each
