@@ -289,7 +289,7 @@ class Polygons(unittest.TestCase):
 
 
     def scene_files(self, corners):
-        """Returns a mesh of half the size, moved by -3, with transforms that restore it, by names of files."""
+        """Returns files of a mesh of half the size, moved by -3, with transforms that restore it."""
         points, order = numpy.unique(corners.reshape(-1, 3), axis=0, return_inverse=True)
         binary = order.astype("<u2").tobytes() + points.astype("<f4").tobytes()
         document = {
