@@ -19,8 +19,8 @@
 #include "algorithms/hermite/hermite_view.h"
 #include "algorithms/hermite/samplers.h"
 #include "algorithms/lattice/memory_estimate.h"
-#include "algorithms/remesh/embedded_polygons.h"
 #include "algorithms/remesh/exception_balls.h"
+#include "algorithms/remesh/manifold_polygons.h"
 #include "algorithms/remesh/two_sided_proof.h"
 #include "algorithms/remesh/voxel_size.h"
 #include "algorithms/voxelization/voxelize.h"
@@ -143,8 +143,13 @@ class BoundedRemesher {
   }
 
  private:
-  /// Returns true if the polygons are a valid mesh of the solid as they are, so that the whole error is left
-  /// to the collapses. Lengths are then measured in a power of two, so that vertices are exact.
+  /// Returns true if the polygons are a valid mesh of the solid as they are, or become one when few triangles
+  /// that meet others are collapsed. The whole error is then left to the collapses. Lengths are measured in a
+  /// power of two, so that vertices are exact.
+  ///
+  /// Triangles that meet no other have the solid behind them if one of their patch has. Those that do meet
+  /// others may be inside the solid in part. So the distance of the mesh is that from the former only, and
+  /// both kinds have to be near the mesh. That no triangles of the mesh meet is then tested at the end.
   bool try_polygons() {
     // A file in single precision would move vertices that are relative to an origin.
     if (options_.through_volume || proof_.turns().empty() ||
@@ -152,11 +157,10 @@ class BoundedRemesher {
       return false;
     const auto polygons = [&] {
       const Stage stage(context_, "test polygons");
-      return embedded_polygons(mesh_, proof_.turns(), context_);
+      return manifold_polygons(mesh_, proof_.turns(), context_);
     }();
     if (!polygons) return false;
-    // The sides of a triangle are those of all that it is connected with, because no triangles meet.
-    for (const std::uint32_t t : largest_of_components(*polygons))
+    for (const std::uint32_t t : largest_of_patches(*polygons))
       if (!proof_.bounds_solid(polygons->points, polygons->triangles[t])) return false;
     const double unit =
         std::exp2(std::floor(std::log2(std::min(polygons->mean_edge, kLargestUnit * options_.error))));
@@ -169,11 +173,26 @@ class BoundedRemesher {
                       polygons->points,
                       Eigen::Vector3d::Zero()};
     count_work(double(polygons->points.size()));
-    const SurfaceDistance surface(polygons->points, polygons->triangles);
-    result_.voxel_size = 0.0;
+    std::vector<Triangle> certain;
+    for (std::size_t t = 0; t < polygons->triangles.size(); ++t)
+      if (!polygons->meets[t]) certain.push_back(polygons->triangles[t]);
+    const SurfaceDistance surface(polygons->points, certain);
     if (!collapse_all(now, surface, std::vector<double>(polygons->points.size(), 0.0)).empty()) return false;
+    if (!polygons->is_embedded() && !is_solid(result_.mesh)) return false;
+    result_.voxel_size = 0.0;
     note_surface(now);
     return true;
+  }
+
+  /// Returns true if a mesh is embedded, and each of its shells has the inside behind it.
+  bool is_solid(const PolygonMesh& mesh) const {
+    const TwoSidedProof sides(mesh, options_.error, true, false);
+    if (!std::ranges::all_of(sides.turns(), [](std::int8_t turn) { return turn == 1; })) return false;
+    const auto made = manifold_polygons(mesh, sides.turns(), context_);
+    return made && made->is_embedded() &&
+           std::ranges::all_of(largest_of_patches(*made), [&](std::uint32_t t) {
+             return sides.bounds_solid(made->points, made->triangles[t]);
+           });
   }
 
   /// Returns true if the bound was reached with larger voxels than `first`, as for plane and smooth parts,
@@ -447,13 +466,15 @@ class BoundedRemesher {
   /// first time fails, or none, with the mesh in the result. With exceptions it does not fail.
   std::vector<Far> collapse_all(const Attempt& uniform, const SurfaceDistance& surface,
                                 const std::vector<double>& apart) {
+    constexpr std::size_t kAny = std::numeric_limits<std::size_t>::max();
     CertifiedMesh mesh;
     std::vector<Far> far =
-        collapse(uniform, surface, tolerances(uniform, apart, 0.0), mesh, excepted_.has_value());
+        collapse(uniform, surface, tolerances(uniform, apart, 0.0), mesh, excepted_.has_value(), kAny);
     if (!far.empty()) return far;
     // The result may be collapsed again, because the proof is against the polygons each time. Two thirds of
     // the vertices that the first collapses leave on plane parts can be removed; of a scan next to none.
-    for (bool is_worth_it = true; is_worth_it;) {
+    while (true) {
+      const auto few = std::size_t(kWorthAgain * double(mesh.triangles.size()));
       const BoundedMesh before = result_;
       const Attempt now{uniform.voxel_size,
                         uniform.surface,
@@ -461,16 +482,14 @@ class BoundedRemesher {
                         FineMesh(mesh.points, mesh.triangles, context_),
                         uniform.in_file(mesh.points),
                         uniform.offset};
-      if (!collapse(now, surface, tolerances(now, apart_around_points(now, surface), kLeastShare), mesh,
-                    false)
-               .empty()) {
+      const std::vector<float> rest = tolerances(now, apart_around_points(now, surface), kLeastShare);
+      if (!collapse(now, surface, rest, mesh, false, few).empty() || mesh.triangles.size() > few) {
         const double work = result_.work;
         result_ = before;
         result_.work = work;
         break;
       }
       result_.rounds = before.rounds;
-      is_worth_it = double(mesh.triangles.size()) < kWorthAgain * double(before.mesh.triangle_count());
     }
     return far;
   }
@@ -485,15 +504,17 @@ class BoundedRemesher {
   }
 
   /// Collapses and proves. Returns the positions where the proof fails, or none, with `mesh` and the result
-  /// set. @param excepts_rest true if positions that fail at last are exceptions, too
+  /// set; nothing is proved, and neither set, if more than `most` triangles are left.
+  /// @param excepts_rest true if positions that fail at last are exceptions, too
   std::vector<Far> collapse(const Attempt& now, const SurfaceDistance& surface, std::vector<float> tolerance,
-                            CertifiedMesh& mesh, bool excepts_rest) {
+                            CertifiedMesh& mesh, bool excepts_rest, std::size_t most) {
     // The mesh is then within the error by the triangle inequality, as far as the tolerances are right.
     std::vector<Far> far;
     CertifiedMesh coarse;
     for (int lowerings = 0; lowerings <= kLowerings; ++lowerings, ++result_.rounds) {
       coarse = decimate_certified(now.fine, tolerance, {}, now.file, context_);
       count_work(double(now.fine.points().size()));
+      if (coarse.triangles.size() > most) return {};
       far = prove(now, surface, coarse);
       if (far.empty() || !lower_around(now, far, tolerance)) break;
     }

@@ -364,6 +364,18 @@ TEST(BoundedRemesh, AValidMeshNeedsNoVolume) {
   EXPECT_LE(std::max(exact.to_surface, exact.from_surface), 1e-6);
 }
 
+TEST(BoundedRemesh, FewTrianglesThatMeetOthersAreCollapsed) {
+  // A sphere one vertex of which is pushed through the far side of its neighbours' triangles.
+  PolygonMesh polygons = sphere(Vector3d(0, 0, 0), 1.0, 48);
+  const Eigen::Vector3f at = polygons.points[3 * 2400], beyond = 0.99f * at + Eigen::Vector3f(0.1f, 0.05f, 0);
+  for (Eigen::Vector3f& p : polygons.points)
+    if (p == at) p = beyond;
+  const BoundedMesh made = simplified(polygons, 0.15);
+  EXPECT_EQ(made.voxel_size, 0.0);
+  EXPECT_EQ(topology_of(made.mesh.points, made.mesh.triangles).genus, 0);
+  for_each_place(made.mesh, 8, [&](const Vector3d& p) { EXPECT_NEAR(p.norm(), 1.0, 0.16); });
+}
+
 TEST(BoundedRemesh, AValidMeshKeepsItsTopologyHoweverLargeTheError) {
   // A crumb next to a box with a cavity, all nearer to each other than the error.
   PolygonMesh mesh = box(Vector3d(0, 0, 0), Vector3d(1, 1, 1));
@@ -464,7 +476,8 @@ TEST(BoundedRemesh, ATryThatFailsLosesNothing) {
     PolygonMesh polygons = turned_star(9);
     for (Eigen::Vector3f& p : polygons.points) p *= float(scale);
     RunContext context;
-    const BoundedMesh made = remesh_to_budget(polygons, 500, {.most_points = 3e5}, context);
+    const BoundedMesh made =
+        remesh_to_budget(polygons, 500, {.most_points = 3e5, .through_volume = true}, context);
     ASSERT_TRUE(made.unmet.empty());
     EXPECT_LE(made.mesh.triangle_count(), 500u);
     EXPECT_LE(std::max(made.to_surface, made.from_surface), made.error);
@@ -474,7 +487,7 @@ TEST(BoundedRemesh, ATryThatFailsLosesNothing) {
   PolygonMesh polygons = turned_star(9);
   for (Eigen::Vector3f& p : polygons.points) p *= 1e-7f;
   RunContext context;
-  EXPECT_THROW(remesh_to_budget(polygons, 500, {}, context), Error);
+  EXPECT_THROW(remesh_to_budget(polygons, 500, {.through_volume = true}, context), Error);
 }
 
 TEST(BoundedRemesh, RefusesWhatHasNoBound) {

@@ -154,8 +154,9 @@ class SurfaceDistance::Walk {
   }
 
   /// Returns the triangle nearest to p, or one that is near enough for all about p. The distance to `known`,
-  /// which is near, saves most of the search.
+  /// which is near, or to the one found last saves most of the search.
   NearestTriangle nearest(const Eigen::Vector3d& p, std::uint32_t known, double radius) const {
+    if (known == TriangleTree::kNone) known = last_;
     const double most = limit_ - radius,
                  enough = wanted_ == Wanted::any_bound && most > 0.0 ? most * most : -1.0;
     if (known == TriangleTree::kNone) return tree_.nearest(p, search_, enough);

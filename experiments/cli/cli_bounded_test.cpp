@@ -91,6 +91,15 @@ TEST_F(CliBoundedTest, ThinPartsAreExceptedAndListed) {
                   .empty());
 }
 
+TEST_F(CliBoundedTest, AValidMeshBecomesAVolumeOnRequestOnly) {
+  write_cube();
+  const auto voxel_size_of = [&](const std::string& options) -> double {
+    return json_of("remesh cube.off out.ply --error 1% --json" + options).at("figures").at("voxel_size");
+  };
+  EXPECT_EQ(voxel_size_of(""), 0.0);
+  EXPECT_GT(voxel_size_of(" --through-volume"), 0.0);
+}
+
 TEST_F(CliBoundedTest, WrongUsageIsSaid) {
   write_cube();
   const std::vector<Words> wrong = {
@@ -103,6 +112,7 @@ TEST_F(CliBoundedTest, WrongUsageIsSaid) {
       {"--error", "1%", "--signs", "unsigned"},
       {"--resolution", "10", "--over-holes"},
       {"--resolution", "10", "--except-thin"},
+      {"--resolution", "10", "--through-volume"},
       {"--resolution", "auto", "--error", "1%"},
       {"--resolution", "auto", "--voxel-size", "0.1"},
       {"--resolution", "automatic"},

@@ -375,7 +375,7 @@ int run_bounded(const ConvertArguments& arguments, const CLI::App& command, Sess
   session.context.figure("error_asked", made.error);
   session.context.figure("certified_to_polygons", made.to_surface);
   session.context.figure("certified_from_polygons", made.from_surface);
-  if (made.voxel_size > 0.0) session.context.figure("voxel_size", made.voxel_size);
+  session.context.figure("voxel_size", made.voxel_size);
   session.context.figure("triangles", double(made.mesh.triangle_count()));
   session.context.figure("rounds", made.rounds);
   if (made.free_area > 0.0) session.context.figure("area_that_bounds_nothing", made.free_area);

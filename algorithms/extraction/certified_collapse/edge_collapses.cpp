@@ -17,6 +17,9 @@ namespace {
 using Eigen::Vector3d;
 
 constexpr double kFirstSide = 32.0;  ///< voxels: about a thousand triangles, which fit a core's cache
+/// Most domains of the first round that a triangle is listed in, in the mean: those of a mesh that was not
+/// made from voxels can be far larger than a domain.
+constexpr double kMostDomains = 64.0;
 /// Displacement of the domains of a round, as a share of their side, so that no two rounds share borders.
 constexpr double kDisplacement = 0.382;
 /// Longest edge that a round makes, as a share of the side: parts at a border must not stay much finer.
@@ -178,6 +181,19 @@ DecimatedMesh begin(const MergeForest& forest, const MergedMesh& merged, std::sp
   return mesh;
 }
 
+/// Returns the side of the domains of the first round, voxels.
+double first_side(const DecimatedMesh& mesh) {
+  for (double side = kFirstSide;; side *= 2) {
+    double domains = 0.0;
+    for (const Triangle& t : mesh.triangles) {
+      Bounds box;
+      for (const std::uint32_t p : t) box.add(mesh.points[p]);
+      domains += (box.size() / side + Vector3d::Ones()).prod();
+    }
+    if (domains <= kMostDomains * double(mesh.triangles.size())) return side;
+  }
+}
+
 }  // namespace
 
 void collapse_edges(MergeForest& forest, const MergedMesh& merged, std::span<const std::uint8_t> where,
@@ -188,7 +204,7 @@ void collapse_edges(MergeForest& forest, const MergedMesh& merged, std::span<con
   for (const Vector3d& p : merged.mesh->points()) box.add(p);
   // No edge is longer than the box's diagonal.
   const double largest = (box.upper - box.lower).norm();
-  for (double side = kFirstSide; !mesh.triangles.empty(); side *= 2) {
+  for (double side = first_side(mesh); !mesh.triangles.empty(); side *= 2) {
     Round round(mesh, box, side, context);
     // Joins of one domain build on one another; domains share no vertices. In the order of domains, so nodes
     // have the same numbers for any number of threads.

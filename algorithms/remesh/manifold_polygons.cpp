@@ -1,4 +1,4 @@
-#include "algorithms/remesh/embedded_polygons.h"
+#include "algorithms/remesh/manifold_polygons.h"
 
 #include <Eigen/Geometry>
 #include <algorithm>
@@ -13,6 +13,9 @@
 
 namespace hermesh {
 namespace {
+
+/// Of this many triangles one may meet another; a volume shows such meshes better if there are more.
+constexpr std::size_t kFewMeet = 32;
 
 /// Returns true if each side of a triangle is that of exactly one other, in reverse.
 bool is_closed(const FineMesh& mesh) {
@@ -43,24 +46,29 @@ bool is_manifold(const FineMesh& mesh) {
   return true;
 }
 
-bool is_free_of_contacts(const FineMesh& mesh, const RunContext& context) {
+/// Returns a flag for each triangle: 1 if it may meet another one; nothing if more than `most` do.
+std::vector<std::uint8_t> in_contact(const FineMesh& mesh, std::size_t most, const RunContext& context) {
   const std::size_t n = mesh.triangles().size();
   std::vector<Bounds> boxes(n);
   for (std::uint32_t t = 0; t < n; ++t)
     for (const Eigen::Vector3d& p : mesh.corners(t)) boxes[t].add(p);
   const TriangleGrid grid(boxes);
-  std::atomic<bool> is_free = true;
+  std::vector<std::uint8_t> result(n);
+  std::atomic<std::size_t> count = 0;
+  const auto mark = [&](std::uint32_t t) { count += !std::atomic_ref(result[t]).exchange(1); };
   parallel_blocks(n, context, [&](std::size_t i) {
-    if (!is_free.load(std::memory_order_relaxed)) return;
+    if (count > most) return;
     const auto t = static_cast<std::uint32_t>(i);
     // Each pair once: from the triangle of the smaller level, at equal levels from the first.
     grid.visit(t, grid.level(t), [&](std::uint32_t u) {
       if (u == t || (grid.level(u) == grid.level(t) && u < t) || !boxes[t].overlaps(boxes[u])) return;
-      if (!certainly_apart(mesh.triangles()[t], mesh.triangles()[u], mesh.points()))
-        is_free.store(false, std::memory_order_relaxed);
+      if (certainly_apart(mesh.triangles()[t], mesh.triangles()[u], mesh.points())) return;
+      mark(t);
+      mark(u);
     });
   });
-  return is_free;
+  if (count > most) result.clear();
+  return result;
 }
 
 }  // namespace
@@ -73,9 +81,11 @@ std::vector<Eigen::Vector3d> scaled(std::span<const Eigen::Vector3f> points, dou
   return result;
 }
 
-std::optional<EmbeddedPolygons> embedded_polygons(const PolygonMesh& mesh, std::span<const std::int8_t> turns,
+bool ManifoldPolygons::is_embedded() const { return std::ranges::find(meets, 1) == meets.end(); }
+
+std::optional<ManifoldPolygons> manifold_polygons(const PolygonMesh& mesh, std::span<const std::int8_t> turns,
                                                   const RunContext& context) {
-  EmbeddedPolygons result;
+  ManifoldPolygons result;
   std::vector<Triangle> triangles = triangulated(mesh);
   const std::vector<std::uint32_t> first = first_at_position(mesh.points);
   std::vector<std::uint32_t> number(mesh.points.size(), FineMesh::kNone);
@@ -101,18 +111,31 @@ std::optional<EmbeddedPolygons> embedded_polygons(const PolygonMesh& mesh, std::
   result.mean_edge = edges / double(result.triangles.size());
   const double unit = std::exp2(std::round(std::log2(result.mean_edge)));
   const FineMesh fine(scaled(result.points, unit), result.triangles, context);
-  if (!is_closed(fine) || !is_manifold(fine) || !is_free_of_contacts(fine, context)) return std::nullopt;
+  if (!is_closed(fine) || !is_manifold(fine)) return std::nullopt;
+  result.meets = in_contact(fine, result.triangles.size() / kFewMeet, context);
+  if (result.meets.empty()) return std::nullopt;
   return result;
 }
 
-std::vector<std::uint32_t> largest_of_components(const EmbeddedPolygons& mesh) {
-  DisjointSets sets(mesh.points.size());
-  for (const Triangle& t : mesh.triangles)
-    for (const std::uint32_t p : t) sets.join(t[0], p);
-  std::vector<std::uint32_t> largest(mesh.points.size(), FineMesh::kNone);
-  std::vector<double> most(mesh.points.size(), 0.0);
-  for (std::uint32_t i = 0; i < mesh.triangles.size(); ++i) {
-    const std::uint32_t set = sets.find(mesh.triangles[i][0]);
+std::vector<std::uint32_t> largest_of_patches(const ManifoldPolygons& mesh) {
+  const std::size_t n = mesh.triangles.size();
+  // Sides of triangles that meet no other, by their ends; each occurs once or twice.
+  std::vector<std::array<std::uint32_t, 3>> sides;
+  for (std::uint32_t t = 0; t < n; ++t)
+    for (std::size_t i = 0; i < 3 && !mesh.meets[t]; ++i) {
+      const auto [low, high] = std::minmax(mesh.triangles[t][i], mesh.triangles[t][(i + 1) % 3]);
+      sides.push_back({low, high, t});
+    }
+  std::ranges::sort(sides);
+  DisjointSets sets(n);
+  for (std::size_t i = 1; i < sides.size(); ++i)
+    if (sides[i][0] == sides[i - 1][0] && sides[i][1] == sides[i - 1][1])
+      sets.join(sides[i][2], sides[i - 1][2]);
+  std::vector<std::uint32_t> largest(n, FineMesh::kNone);
+  std::vector<double> most(n, 0.0);
+  for (std::uint32_t i = 0; i < n; ++i) {
+    if (mesh.meets[i]) continue;
+    const std::uint32_t set = sets.find(i);
     if (const double here = area(mesh.points, mesh.triangles[i]); here > most[set])
       most[set] = here, largest[set] = i;
   }
