@@ -5,6 +5,7 @@
 #include <cmath>
 #include <functional>
 #include <limits>
+#include <map>
 #include <memory>
 #include <numeric>
 #include <optional>
@@ -48,6 +49,9 @@ constexpr double kFewestVoxels = 16.0;
 /// Largest unit of length for the collapses of the polygons themselves, in errors: the slack of their proof
 /// is kDistanceSlack units.
 constexpr double kLargestUnit = 4.0;
+/// Size of the pieces of triangles that meet others, up to which it is not known whether they bound the
+/// solid, in errors.
+constexpr double kUncertain = 0.125;
 /// Next voxel size, as a share of the last, if vertices did not show which parts are too far.
 constexpr double kFinerBetween = 0.6;
 /// Least tolerance when a mesh is collapsed again, in errors, and the share of triangles left that makes
@@ -147,9 +151,9 @@ class BoundedRemesher {
   /// that meet others are collapsed. The whole error is then left to the collapses. Lengths are measured in a
   /// power of two, so that vertices are exact.
   ///
-  /// Triangles that meet no other have the solid behind them if one of their patch has. Those that do meet
-  /// others may be inside the solid in part. So the distance of the mesh is that from the former only, and
-  /// both kinds have to be near the mesh. That no triangles of the mesh meet is then tested at the end.
+  /// A triangle, or piece of one, that meets no other has the solid behind it everywhere if it has so next to
+  /// its middle. The few small pieces that do meet others may be inside the solid in part. So distances of
+  /// the mesh are measured to the former only, and both kinds have to be near the mesh.
   bool try_polygons() {
     // A file in single precision would move vertices that are relative to an origin.
     if (options_.through_volume || proof_.turns().empty() ||
@@ -160,8 +164,22 @@ class BoundedRemesher {
       return manifold_polygons(mesh_, proof_.turns(), context_);
     }();
     if (!polygons) return false;
-    for (const std::uint32_t t : largest_of_patches(*polygons))
-      if (!proof_.bounds_solid(polygons->points, polygons->triangles[t])) return false;
+    const bool is_embedded = polygons->is_embedded();
+    std::vector<Eigen::Vector3f> points = polygons->points;
+    std::vector<Triangle> certain = pieces_apart(*polygons, kUncertain * options_.error, points);
+    std::erase_if(certain, [&](const Triangle& t) { return !proof_.bounds_solid(points, t); });
+    const std::vector<std::uint32_t> largest = largest_of_patch(*polygons);
+    std::map<std::uint32_t, bool> bounds;  // by largest triangle of a patch
+    for (std::size_t t = 0; t < largest.size(); ++t) {
+      if (largest[t] == FineMesh::kNone) continue;
+      const auto [patch, is_new] = bounds.try_emplace(largest[t]);
+      if (is_new) patch->second = proof_.bounds_solid(points, polygons->triangles[largest[t]]);
+      if (patch->second) certain.push_back(polygons->triangles[t]);
+      if (!patch->second && is_embedded) return false;
+    }
+    if (certain.empty()) return false;
+    const ManifoldPolygons mesh = is_embedded ? *polygons : untangled(*polygons, context_);
+    if (!mesh.is_embedded()) return false;
     const double unit =
         std::exp2(std::floor(std::log2(std::min(polygons->mean_edge, kLargestUnit * options_.error))));
     const FilePoints file({.linear = unit * Eigen::Matrix3d::Identity(), .origin = mesh_.origin});
@@ -169,16 +187,19 @@ class BoundedRemesher {
                       std::make_shared<const SolidSurface>(
                           SolidSurface{polygons->points, polygons->triangles, {}, area_, 0.0}),
                       file,
-                      FineMesh(scaled(polygons->points, unit), polygons->triangles, context_),
-                      polygons->points,
+                      FineMesh(scaled(mesh.points, unit), mesh.triangles, context_),
+                      mesh.points,
                       Eigen::Vector3d::Zero()};
     count_work(double(polygons->points.size()));
-    std::vector<Triangle> certain;
-    for (std::size_t t = 0; t < polygons->triangles.size(); ++t)
-      if (!polygons->meets[t]) certain.push_back(polygons->triangles[t]);
-    const SurfaceDistance surface(polygons->points, certain);
-    if (!collapse_all(now, surface, std::vector<double>(polygons->points.size(), 0.0)).empty()) return false;
-    if (!polygons->is_embedded() && !is_solid(result_.mesh)) return false;
+    const SurfaceDistance surface(points, certain);
+    std::vector<double> apart(mesh.points.size(), 0.0);
+    if (!is_embedded) {
+      apart = apart_around_points(now, surface);
+      const SurfaceDistance fine(mesh.points, mesh.triangles);
+      if (!far_points(now, fine, apart).empty()) return false;
+    }
+    if (!collapse_all(now, surface, apart).empty()) return false;
+    if (!is_embedded && !is_solid(result_.mesh)) return false;
     result_.voxel_size = 0.0;
     note_surface(now);
     return true;
@@ -189,8 +210,7 @@ class BoundedRemesher {
     const TwoSidedProof sides(mesh, options_.error, true, false);
     if (!std::ranges::all_of(sides.turns(), [](std::int8_t turn) { return turn == 1; })) return false;
     const auto made = manifold_polygons(mesh, sides.turns(), context_);
-    return made && made->is_embedded() &&
-           std::ranges::all_of(largest_of_patches(*made), [&](std::uint32_t t) {
+    return made && made->is_embedded() && std::ranges::all_of(largest_of_patch(*made), [&](std::uint32_t t) {
              return sides.bounds_solid(made->points, made->triangles[t]);
            });
   }

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <array>
 #include <cstdint>
 #include <optional>
 #include <span>
@@ -16,10 +17,11 @@ namespace hermesh {
 
 /// A closed, oriented, manifold mesh, relative to the origin of its polygons.
 struct ManifoldPolygons {
-  std::vector<Eigen::Vector3f> points;  ///< those in use, no two at one position
-  std::vector<Triangle> triangles;      ///< each with an area
-  std::vector<std::uint8_t> meets;      ///< by triangle: 1 if it may intersect another one
-  double mean_edge = 0.0;               ///< world units
+  std::vector<Eigen::Vector3f> points;              ///< those in use, no two at one position
+  std::vector<Triangle> triangles;                  ///< each with an area
+  std::vector<std::uint8_t> meets;                  ///< by triangle: 1 if it may intersect another one
+  std::vector<std::array<std::uint32_t, 2>> pairs;  ///< that may intersect, as given, in ascending order
+  double mean_edge = 0.0;                           ///< world units
 
   bool is_embedded() const;  ///< true if no triangle meets another one
 };
@@ -32,11 +34,21 @@ struct ManifoldPolygons {
 std::optional<ManifoldPolygons> manifold_polygons(const PolygonMesh& mesh, std::span<const std::int8_t> turns,
                                                   const RunContext& context);
 
+/// Collapses edges of the triangles that meet others, round by round, until none does or no edge is left
+/// that can be collapsed. The mesh remains closed and manifold. Deterministic.
+ManifoldPolygons untangled(ManifoldPolygons mesh, const RunContext& context);
+
 /// Returns the vertices in units of `unit`, a power of two, so that they are exact.
 std::vector<Eigen::Vector3d> scaled(std::span<const Eigen::Vector3f> points, double unit);
 
-/// Returns the triangle with the largest area of each set that is connected by sides, without the triangles
-/// that meet others. The winding number is the same along each side of a set.
-std::vector<std::uint32_t> largest_of_patches(const ManifoldPolygons& mesh);
+/// Returns by triangle the one with the largest area of its patch, the set that is connected by sides;
+/// FineMesh::kNone for the triangles that meet others. Along each side of a patch the winding number is
+/// constant.
+std::vector<std::uint32_t> largest_of_patch(const ManifoldPolygons& mesh);
+
+/// Returns pieces of the triangles that meet others, each of which meets none: all but those with sides
+/// shorter than `smallest`. Appends their corners to `points`, which begin with the mesh's.
+std::vector<Triangle> pieces_apart(const ManifoldPolygons& mesh, double smallest,
+                                   std::vector<Eigen::Vector3f>& points);
 
 }  // namespace hermesh
