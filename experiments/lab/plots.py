@@ -38,26 +38,30 @@ class Curve:
 
 
 @functools.cache
-def _current_plots(name):
-    """Returns the plots of the project's experiment of this name; None if there is no such experiment."""
+def _current(name):
+    """Returns the plots and columns of the project's experiment of this name, {} if there is none."""
     for found in experiment.list_experiments():
         if found["name"] == name:
-            plots = tomllib.loads(found["file"].read_text()).get("plots", [])
-            return [experiment.plot(None, None)(plot, found["file"].name) for plot in plots]
-    return None
+            read = tomllib.loads(found["file"].read_text())
+            plots = [experiment.plot(None, None)(plot, found["file"].name) for plot in read.get("plots", [])]
+            return {"plots": plots} | ({"columns": read["columns"]} if "columns" in read else {})
+    return {}
 
 
-def with_current_plots(rows, directory):
-    """Returns the rows with the plots that their experiment's file asks for today.
+def as_asked_today(rows, directory):
+    """Returns the rows with the plots and columns that their experiment's file asks for today.
 
-    Rows of a directory outside of results/, or in results/local, keep their own plots, since another
-    experiment may have the name of one of the project's. So do rows of experiments that no longer exist.
+    Rows of a directory outside of results/, or in results/local, keep their own, since another experiment may
+    have the name of one of the project's. So do rows of experiments that no longer exist. Rows of baselines
+    keep their columns, which are those that are compared.
     """
     directory, results = pathlib.Path(directory).resolve(), ROOT / "results"
     if not directory.is_relative_to(results) or directory.is_relative_to(results / "local"):
         return rows
-    current = ((row, _current_plots(text_at(row, "/experiment"))) for row in rows)
-    return [row if plots is None else row | {"plots": plots} for row, plots in current]
+    keys = ("plots",) if directory.is_relative_to(results / "baselines") else ("plots", "columns")
+    found = ((row, _current(text_at(row, "/experiment"))) for row in rows)
+    return [row | {key: current[key] for key in keys if key in current and (key == "plots" or key in row)}
+            for row, current in found]
 
 
 def plotted_rows(rows):
@@ -235,7 +239,7 @@ def write_plots(rows, directory, out):
     Plots without a point are left out. Rows in results/ are drawn as their experiment's file asks today.
     """
     with style():
-        for name, own, plots in plotted_rows(with_current_plots(rows, directory)):
+        for name, own, plots in plotted_rows(as_asked_today(rows, directory)):
             numbers = {}  # a label has the same style in all plots of an experiment
             for plot in plots:
                 curves = curves_of(plot, own)

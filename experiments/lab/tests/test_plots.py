@@ -160,10 +160,10 @@ class CurrentPlots(unittest.TestCase):
         row = row_of("a", 1, 0.5, experiment="pareto", plots=[])
         for directory, is_kept in ((ROOT / "results/pareto", True), (ROOT / "results/local/pareto", False),
                                    (pathlib.Path("/somewhere/results/pareto"), False)):
-            names = [plot["name"] for plot in plots.with_current_plots([row], directory)[0]["plots"]]
+            names = [plot["name"] for plot in plots.as_asked_today([row], directory)[0]["plots"]]
             self.assertEqual("dragon" in names, is_kept, directory)
         own = row_of("a", 1, 0.5, experiment="no such experiment")
-        self.assertEqual(plots.with_current_plots([own], ROOT / "results/pareto"), [own])
+        self.assertEqual(plots.as_asked_today([own], ROOT / "results/pareto"), [own])
 
 
 if __name__ == "__main__":
