@@ -108,13 +108,14 @@ def interval_of(name, row):
 
 
 def curves_of(plot, rows):
-    """Returns the curves of a plot, one for each label or, with by_variant, for each method.
+    """Returns the curves of a plot, one for each label or, with by_variant, for each method, which has the
+    name of its label if it has only one.
 
     Columns of y after the first do not depend on the method, e.g. times that the thesis prints: they are
     taken from the rows of the first label and are called by their header. With categories, each column of y
     is one curve, and x numbers the labels from 0, sorted by their least value of plot["x"].
     """
-    who, scale, curves = label_pointer(plot), 100 if plot["percent"] else 1, {}
+    who, scale, curves, labels = label_pointer(plot), 100 if plot["percent"] else 1, {}, {}
     chosen = [(i, row, number_in(plot["x"], row)) for i, row in enumerate(rows)
               if plot["case"] in ("", text_at(row, "/case/name"))
               and plot["resolution"] in (0, row.get("resolution", 0))]
@@ -123,6 +124,8 @@ def curves_of(plot, rows):
         for _, row, x in sorted(chosen, key=lambda each: each[2] or 0):
             least.setdefault(text_at(row, who), len(least))
         chosen = [(i, row, least[text_at(row, who)]) for i, row, _ in chosen]
+    for _, row, _ in chosen:
+        labels.setdefault(text_at(row, who), {})[text_at(row, "/variant/label")] = True
     for i, row, x in chosen:
         label = text_at(row, who)
         if x is None or (plot["log_x"] and not plot["categories"] and x <= 0):
@@ -132,7 +135,8 @@ def curves_of(plot, rows):
             is_further = number > 0 and label != text_at(rows[0], who) and not plot["categories"]
             if y is None or (plot["log_y"] and y <= 0) or is_further:
                 continue
-            name = _column(row, column).header if number > 0 or plot["categories"] else label
+            own = list(labels[label])[0] if len(labels[label]) == 1 else label
+            name = _column(row, column).header if number > 0 or plot["categories"] else own
             ends = [None if end is None else scale * end for end in interval_of(column, row)]
             curves.setdefault(name, Curve(name, column)).points.append(Point(x, scale * y, i, *ends))
     for curve in curves.values():

@@ -53,8 +53,8 @@ class Statements(unittest.TestCase):
             checkout.texts[file] = text
 
     def test_a_passage_that_disappeared_and_a_missing_file_are_named(self):
-        statement = {"name": "size", "everywhere": "", "places": [{"in": "README.md", "pattern": "no such (x)"},
-                                                                  {"in": "absent.md", "pattern": "(x)"}]}
+        places = [{"in": "README.md", "pattern": "no such (x)"}, {"in": "absent.md", "pattern": "(x)"}]
+        statement = {"name": "size", "everywhere": "", "places": places}
         checkout = statements.Checkout(ROOT)
         found = statements.problems_of_statement(statement, checkout, [])
         self.assertEqual(len(found), 2)
