@@ -23,7 +23,8 @@ STATED = [
 # Repeated in every file that archives and indices read.
 NAMED = ["CITATION.cff", "codemeta.json", ".zenodo.json"]
 REQUIRED = ["LICENSE", "LICENSE-GPL-3.0.txt", "LICENSES/Apache-2.0.txt", "REUSE.toml", "CODE_OF_CONDUCT.md",
-            "SECURITY.md", "CONTRIBUTING.md", "packages/dependencies.tsv"]
+            "SECURITY.md", "CONTRIBUTING.md", "packages/dependencies.tsv", "paper/joss/paper.md",
+            "paper/joss/paper.bib", "paper/rescience/metadata.yaml"]
 PLACEHOLDERS = r"10\.0000/placeholder|[a-z]+@example\.org|https://example\.org/\S+?(?=[\"\s>),]|$)"
 MONTHS = "Jan Feb Mar Apr May Jun Jul Aug Sep Oct Nov Dec".split()
 
