@@ -19,6 +19,7 @@
 #include "algorithms/hermite/hermite_view.h"
 #include "algorithms/hermite/samplers.h"
 #include "algorithms/lattice/memory_estimate.h"
+#include "algorithms/remesh/embedded_polygons.h"
 #include "algorithms/remesh/exception_balls.h"
 #include "algorithms/remesh/two_sided_proof.h"
 #include "algorithms/remesh/voxel_size.h"
@@ -44,6 +45,9 @@ constexpr double kLittle = 0.02;
 constexpr std::size_t kTestedFirst = 1000;
 /// Fewest voxels along the longest side, so that there is something to collapse.
 constexpr double kFewestVoxels = 16.0;
+/// Largest unit of length for the collapses of the polygons themselves, in errors: the slack of their proof
+/// is kDistanceSlack units.
+constexpr double kLargestUnit = 4.0;
 /// Next voxel size, as a share of the last, if vertices did not show which parts are too far.
 constexpr double kFinerBetween = 0.6;
 /// Least tolerance when a mesh is collapsed again, in errors, and the share of triangles left that makes
@@ -96,6 +100,7 @@ class BoundedRemesher {
   BoundedMesh run() {
     result_.error = options_.error;
     result_.over_holes = options_.over_holes;
+    if (try_polygons()) return finished();
     result_.voxel_size =
         std::min(std::max(kFirstVoxel * options_.error, smallest_voxel()), longest_ / kFewestVoxels);
     if (try_larger(result_.voxel_size)) return finished();
@@ -138,6 +143,39 @@ class BoundedRemesher {
   }
 
  private:
+  /// Returns true if the polygons are a valid mesh of the solid as they are, so that the whole error is left
+  /// to the collapses. Lengths are then measured in a power of two, so that vertices are exact.
+  bool try_polygons() {
+    // A file in single precision would move vertices that are relative to an origin.
+    if (options_.through_volume || proof_.turns().empty() ||
+        (options_.written_in_single && !mesh_.origin.isZero()))
+      return false;
+    const auto polygons = [&] {
+      const Stage stage(context_, "test polygons");
+      return embedded_polygons(mesh_, proof_.turns(), context_);
+    }();
+    if (!polygons) return false;
+    // The sides of a triangle are those of all that it is connected with, because no triangles meet.
+    for (const std::uint32_t t : largest_of_components(*polygons))
+      if (!proof_.bounds_solid(polygons->points, polygons->triangles[t])) return false;
+    const double unit =
+        std::exp2(std::floor(std::log2(std::min(polygons->mean_edge, kLargestUnit * options_.error))));
+    const FilePoints file({.linear = unit * Eigen::Matrix3d::Identity(), .origin = mesh_.origin});
+    const Attempt now{unit,
+                      std::make_shared<const SolidSurface>(
+                          SolidSurface{polygons->points, polygons->triangles, {}, area_, 0.0}),
+                      file,
+                      FineMesh(scaled(polygons->points, unit), polygons->triangles, context_),
+                      polygons->points,
+                      Eigen::Vector3d::Zero()};
+    count_work(double(polygons->points.size()));
+    const SurfaceDistance surface(polygons->points, polygons->triangles);
+    result_.voxel_size = 0.0;
+    if (!collapse_all(now, surface, std::vector<double>(polygons->points.size(), 0.0)).empty()) return false;
+    note_surface(now);
+    return true;
+  }
+
   /// Returns true if the bound was reached with larger voxels than `first`, as for plane and smooth parts,
   /// where the uniform mesh leaves nearly all of the error to the collapses. An attempt at twice the voxel
   /// size takes a quarter of the time. A failure here is not final: smaller voxels may show parts that larger

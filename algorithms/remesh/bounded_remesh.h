@@ -7,7 +7,11 @@
 // (voxelization/inside/interior_faces.h). Double walls and dangling patches, which orient_faces() omits,
 // bound nothing; nor do the pieces that TwoSidedProof finds free.
 //
-// **The method.** Large voxels, whose uniform mesh uses up almost nothing of the error on plane or smooth
+// **The method.** If the polygons are a closed, manifold, oriented mesh free of self-intersection, each of
+// whose shells has the solid behind it, they are collapsed themselves, with the whole error as tolerance
+// (certified_collapse/), and their topology is preserved. All other polygons become a volume first.
+//
+// Large voxels, whose uniform mesh uses up almost nothing of the error on plane or smooth
 // shapes, are tried first, because a try costs little compared with the next. Otherwise voxels are made
 // smaller until the uniform mesh is within most of the error in both directions at the vertices of both, and
 // within the error between these, triangle by triangle. The rest of the error at each position, minus a
@@ -51,6 +55,8 @@ struct BoundedRemeshOptions {
   /// With ThinRule::keep all polygons count that do not have the solid on both sides: thin and open parts are
   /// thickened within the error. Holes that may not be closed then make the polygons around them open parts.
   ThinRule thin = ThinRule::drop;
+  /// True if a volume is made even where the polygons are a valid mesh already.
+  bool through_volume = false;
   /// True if the bound need not hold in balls around the positions where it cannot be reached.
   bool except_thin = false;
 };
@@ -75,7 +81,7 @@ struct BoundedMesh {
   /// Proved bounds of the distance, one per direction: of all points of the mesh from the surface, and of all
   /// points of the surface from the mesh, except the points in the balls of `excepted`.
   double to_surface = 0.0, from_surface = 0.0;
-  double voxel_size = 0.0;
+  double voxel_size = 0.0;     ///< 0: the polygons themselves were collapsed, and no volume was made
   int rounds = 0;              ///< number of times that voxels or tolerances were lowered
   double free_area = 0.0;      ///< area of polygons far from the mesh that bound nothing
   double left_out_area = 0.0;  ///< area of polygons within the solid, and of double walls

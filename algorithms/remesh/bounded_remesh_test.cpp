@@ -42,8 +42,10 @@ void for_each_place(const PolygonMesh& mesh, int n, F&& f) {
                    double(n)));
 }
 
-BoundedMesh remesh(const PolygonMesh& mesh, const BoundedRemeshOptions& options) {
+/// Remeshes through a volume.
+BoundedMesh remesh(const PolygonMesh& mesh, BoundedRemeshOptions options) {
   RunContext context;
+  options.through_volume = true;
   return bounded_remesh(mesh, options, context);
 }
 
@@ -332,6 +334,80 @@ TEST(Topology, CountsComponentsAndHandles) {
       torus.triangles.push_back({at(i, j), at(i + 1, j + 1), at(i, j + 1)});
     }
   EXPECT_EQ(of(torus).genus, 1);
+}
+
+/// Remeshes without a volume if possible; expects both bounds to hold.
+BoundedMesh simplified(const PolygonMesh& mesh, double error) {
+  RunContext context;
+  BoundedMesh made = bounded_remesh(mesh, {.error = error}, context);
+  EXPECT_TRUE(made.unmet.empty());
+  EXPECT_LE(made.to_surface, error);
+  EXPECT_LE(made.from_surface, error);
+  return made;
+}
+
+TEST(BoundedRemesh, AValidMeshNeedsNoVolume) {
+  const PolygonMesh polygons = sphere(Vector3d(5, 5, 5), 1.0, 48);
+  for (const double error : {0.003, 0.02, 0.1}) {
+    const BoundedMesh made = simplified(polygons, error);
+    EXPECT_EQ(made.voxel_size, 0.0);
+    for_each_place(made.mesh, 8, [&](const Vector3d& p) {
+      EXPECT_LE(std::abs((p - Vector3d(5, 5, 5)).norm() - 1.0), error + 0.0022);
+    });
+    EXPECT_LE(double(made.mesh.triangle_count()),
+              1.2 * double(remesh(polygons, {.error = error}).mesh.triangle_count()));
+  }
+  const PolygonMesh cube = turned(box(Vector3d(0.1, -0.2, 0.3), Vector3d(1.1, 0.5, 0.9)));
+  const BoundedMesh exact = simplified(cube, 1e-5);
+  EXPECT_EQ(exact.voxel_size, 0.0);
+  EXPECT_EQ(exact.mesh.triangle_count(), 12u);
+  EXPECT_LE(std::max(exact.to_surface, exact.from_surface), 1e-6);
+}
+
+TEST(BoundedRemesh, AValidMeshKeepsItsTopologyHoweverLargeTheError) {
+  // A crumb next to a box with a cavity, all nearer to each other than the error.
+  PolygonMesh mesh = box(Vector3d(0, 0, 0), Vector3d(1, 1, 1));
+  append(mesh, box(Vector3d(0.01, 0.01, 0.01), Vector3d(0.99, 0.99, 0.99)), true);
+  append(mesh, box(Vector3d(1.003, 0.513, 0.513), Vector3d(1.008, 0.518, 0.518)));
+  const BoundedMesh made = simplified(mesh, 0.05);
+  EXPECT_EQ(made.voxel_size, 0.0);
+  EXPECT_EQ(topology_of(made.mesh.points, made.mesh.triangles).components, 3u);
+  EXPECT_TRUE(notes(made).empty());
+  // Given inside out as a whole.
+  for (Triangle& t : mesh.triangles) std::swap(t[1], t[2]);
+  EXPECT_EQ(simplified(mesh, 0.05).mesh, made.mesh);
+}
+
+TEST(BoundedRemesh, PolygonsThatAreNoValidMeshBecomeAVolume) {
+  const PolygonMesh cube = box(Vector3d(0, 0, 0), Vector3d(1, 1, 1));
+  const auto with = [&](const Vector3d& low, const Vector3d& high, bool reversed = false) {
+    PolygonMesh mesh = cube;
+    append(mesh, box(low, high), reversed);
+    return mesh;
+  };
+  PolygonMesh split = cube;  // a vertex on an edge, in one of its two triangles only
+  split.points.push_back({0.5f, 0.0f, 0.0f});
+  const auto has_edge = [](const Triangle& t, const PolygonMesh& mesh) {
+    int on_edge = 0;
+    for (const std::uint32_t p : t) on_edge += mesh.points[p].y() == 0.0f && mesh.points[p].z() == 0.0f;
+    return on_edge == 2;
+  };
+  const auto at =
+      std::ranges::find_if(split.triangles, [&](const Triangle& t) { return has_edge(t, split); });
+  ASSERT_NE(at, split.triangles.end());
+  Triangle first = *at, second = *at;
+  for (std::size_t i = 0, replaced = 0; i < 3; ++i)
+    if (split.points[first[i]].y() == 0.0f && split.points[first[i]].z() == 0.0f)
+      (replaced++ == 0 ? first : second)[i] = 8;
+  *at = first;
+  split.triangles.push_back(second);
+  for (const PolygonMesh& mesh :
+       {with(Vector3d(0.5, 0.25, 0.25), Vector3d(1.5, 0.75, 0.75)),    // overlap
+        with(Vector3d(1, 0.25, 0.25), Vector3d(1.5, 0.75, 0.75)),      // contact
+        with(Vector3d(1, 1, 1), Vector3d(1.5, 1.5, 1.5)),              // a shared corner
+        with(Vector3d(0.25, 0.25, 0.25), Vector3d(0.75, 0.75, 0.75)),  // a shell that bounds nothing
+        with(Vector3d(0, 0, 0), Vector3d(1, 1, 1)), split})
+    EXPECT_GT(simplified(mesh, 0.04).voxel_size, 0.0);
 }
 
 TEST(BoundedRemesh, ABudgetIsKept) {

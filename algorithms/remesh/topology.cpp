@@ -8,14 +8,19 @@
 
 namespace hermesh {
 
-Topology topology_of(std::span<const Eigen::Vector3f> points, std::span<const Triangle> triangles) {
-  std::vector<std::uint32_t> order(points.size()), number(points.size());
+std::vector<std::uint32_t> first_at_position(std::span<const Eigen::Vector3f> points) {
+  std::vector<std::uint32_t> order(points.size()), first(points.size());
   std::iota(order.begin(), order.end(), 0u);
   const auto key = [&](std::uint32_t i) { return std::array{points[i].x(), points[i].y(), points[i].z()}; };
-  std::sort(order.begin(), order.end(), [&](std::uint32_t a, std::uint32_t b) { return key(a) < key(b); });
+  std::sort(order.begin(), order.end(),
+            [&](std::uint32_t a, std::uint32_t b) { return key(a) != key(b) ? key(a) < key(b) : a < b; });
   for (std::size_t i = 0; i < order.size(); ++i)
-    number[order[i]] = i > 0 && key(order[i]) == key(order[i - 1]) ? number[order[i - 1]] : order[i];
+    first[order[i]] = i > 0 && key(order[i]) == key(order[i - 1]) ? first[order[i - 1]] : order[i];
+  return first;
+}
 
+Topology topology_of(std::span<const Eigen::Vector3f> points, std::span<const Triangle> triangles) {
+  const std::vector<std::uint32_t> number = first_at_position(points);
   DisjointSets sets(points.size());
   std::vector<bool> used(points.size());
   std::vector<std::array<std::uint32_t, 2>> edges;

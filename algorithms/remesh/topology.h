@@ -11,6 +11,9 @@
 
 namespace hermesh {
 
+/// Returns by point the least number of a point at the same position. O(n log n) time.
+std::vector<std::uint32_t> first_at_position(std::span<const Eigen::Vector3f> points);
+
 struct Topology {
   std::size_t components = 0;         ///< sets of triangles connected by vertices
   std::optional<std::int64_t> genus;  ///< sum over the components; none if an edge has not two triangles

@@ -47,17 +47,25 @@ std::span<const std::int8_t> TwoSidedProof::turns() const {
                   : std::span<const std::int8_t>();
 }
 
+std::optional<std::array<Eigen::Vector3d, 2>> TwoSidedProof::sides_of(const Corners& piece) const {
+  const Eigen::Vector3d normal = (piece[1] - piece[0]).cross(piece[2] - piece[0]).normalized();
+  if (!normal.allFinite() || normal.isZero()) return std::nullopt;
+  const Eigen::Vector3d middle = (piece[0] + piece[1] + piece[2]) / 3.0, step = rounding_ * normal;
+  return std::array<Eigen::Vector3d, 2>{middle + step, middle - step};
+}
+
+bool TwoSidedProof::bounds_solid(const std::vector<Eigen::Vector3f>& points, const Triangle& triangle) const {
+  const auto sides = sides_of({points[triangle[0]].cast<double>(), points[triangle[1]].cast<double>(),
+                               points[triangle[2]].cast<double>()});
+  return sides && winding_->number().at((*sides)[0]) < 0.5 && winding_->number().at((*sides)[1]) > 0.5;
+}
+
 void TwoSidedProof::bound_nothing(std::span<const Corners> pieces, std::span<std::uint8_t> results) const {
   std::vector<Eigen::Vector3d> points;  // two for each piece that has an area
   for (std::size_t i = 0; i < pieces.size(); ++i) {
-    const Corners& piece = pieces[i];
-    const Eigen::Vector3d normal = (piece[1] - piece[0]).cross(piece[2] - piece[0]).normalized();
-    const bool has_area = normal.allFinite() && !normal.isZero();
-    results[i] = !has_area;
-    if (!has_area) continue;
-    const Eigen::Vector3d middle = (piece[0] + piece[1] + piece[2]) / 3.0, step = rounding_ * normal;
-    points.push_back(middle + step);
-    points.push_back(middle - step);
+    const auto sides = sides_of(pieces[i]);
+    results[i] = !sides;
+    if (sides) points.insert(points.end(), sides->begin(), sides->end());
   }
   std::vector<float> numbers(points.size());
   winding_->number().at(points, numbers);

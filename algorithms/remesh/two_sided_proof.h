@@ -67,6 +67,10 @@ class TwoSidedProof {
   /// Returns true if the surface bounds nothing next to a position, a corner of its triangle.
   bool bounds_nothing(const SolidSurface& surface, const Far& at) const;
 
+  /// Returns true if the solid is behind a triangle and not in front of it, next to its middle. Requires that
+  /// the winding number defines the inside.
+  bool bounds_solid(const std::vector<Eigen::Vector3f>& points, const Triangle& triangle) const;
+
   /// Compares a mesh with the surface. `points` are relative to a position that is `offset` from the
   /// polygons' origin; `to` and `from` measure the distances to the surface and to the mesh. With
   /// Wanted::small_bound the bounds are minimal, to a few hundredths of the error; otherwise they are at most
@@ -80,6 +84,8 @@ class TwoSidedProof {
 
  private:
   using Corners = std::array<Eigen::Vector3d, 3>;
+  /// Returns the positions in front of and behind the middle of a piece, just off it; none without an area.
+  std::optional<std::array<Eigen::Vector3d, 2>> sides_of(const Corners& piece) const;
   /// Sets a result for each of some pieces near each other: 1 if it bounds nothing.
   void bound_nothing(std::span<const Corners> pieces, std::span<std::uint8_t> results) const;
   DistanceFromSurface smallest_bound(const SurfaceDistance& to, std::span<const Eigen::Vector3f> points,

@@ -41,6 +41,7 @@ struct ConvertArguments {
   std::optional<std::int64_t> triangles;  ///< budget
   bool over_holes = false, except_thin = false;
   std::optional<double> most_points;
+  bool through_volume = false;
   double smallest_voxel = 0.0;  ///< world units; 0: not given
 };
 
@@ -351,6 +352,7 @@ int run_bounded(const ConvertArguments& arguments, const CLI::App& command, Sess
       .smallest_voxel = arguments.smallest_voxel,
       .written_in_single = is_written_in_single(paths.out),
       .thin = arguments.voxelizing.thin.value_or("keep") == "keep" ? ThinRule::keep : ThinRule::drop,
+      .through_volume = arguments.through_volume,
       .except_thin = arguments.except_thin};
   check_mesh_output(paths.out);
   const PolygonMesh mesh = read_polygons(paths.in, session);
@@ -373,7 +375,7 @@ int run_bounded(const ConvertArguments& arguments, const CLI::App& command, Sess
   session.context.figure("error_asked", made.error);
   session.context.figure("certified_to_polygons", made.to_surface);
   session.context.figure("certified_from_polygons", made.from_surface);
-  session.context.figure("voxel_size", made.voxel_size);
+  if (made.voxel_size > 0.0) session.context.figure("voxel_size", made.voxel_size);
   session.context.figure("triangles", double(made.mesh.triangle_count()));
   session.context.figure("rounds", made.rounds);
   if (made.free_area > 0.0) session.context.figure("area_that_bounds_nothing", made.free_area);
@@ -382,7 +384,10 @@ int run_bounded(const ConvertArguments& arguments, const CLI::App& command, Sess
   if (made.thin) session.context.note(thin_note(*made.thin, made.voxel_size));
   report_thin_parts(made.thin, session);
   report_exceptions(made, session);
-  print_extracted(session, made.mesh, "voxels of " + text(made.voxel_size), watch.seconds());
+  print_extracted(session, made.mesh,
+                  made.voxel_size > 0.0 ? "voxels of " + text(made.voxel_size)
+                                        : "no volume: the polygons are a valid mesh",
+                  watch.seconds());
   const double bound = std::max(made.to_surface, made.from_surface);
   print_summary(session, "certified: the mesh is within " + text(made.to_surface) +
                              " of the polygons' solid, and the solid within " + text(made.from_surface) +
@@ -443,6 +448,10 @@ void add_bound_options(CLI::App& command, CLI::App& size, ConvertArguments& argu
                   "Where the bound cannot be reached (holes, walls and gaps too thin for the voxels), let it "
                   "hold elsewhere, and list these places in a note and in --json as balls (default: the "
                   "command fails)");
+  group->add_flag(
+      "--through-volume", arguments.through_volume,
+      "Make a volume also if the polygons are a closed, manifold mesh free of self-intersection "
+      "(default: such a mesh is simplified as it is, which preserves its topology and is faster)");
   group
       ->add_option("--limit-points", arguments.most_points,
                    "Maximum number of vertices of the finest mesh (default: 3e7, some 9 GiB, with --error; "
@@ -491,7 +500,8 @@ void add_conversions(CLI::App& app, Session& session) {
   add_bound_options(*command, *size, *arguments);
   set_work(*command, session, [arguments, command, &session] {
     if (arguments->triangles || !arguments->error.empty()) return run_bounded(*arguments, *command, session);
-    refuse_idle(*command, {"--over-holes", "--except-thin", "--limit-points", "--smallest-voxel"},
+    refuse_idle(*command,
+                {"--over-holes", "--except-thin", "--through-volume", "--limit-points", "--smallest-voxel"},
                 "it needs --error or --triangles");
     return run_remesh(*arguments, session);
   });

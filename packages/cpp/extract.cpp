@@ -215,6 +215,7 @@ BoundedRemesh remesh_within(const Mesh& mesh, const BoundOptions& options, Conte
                                      .smallest_voxel = options.smallest_voxel,
                                      .written_in_single = options.written_in_single,
                                      .thin = options.thin == Thin::keep ? ThinRule::keep : ThinRule::drop,
+                                     .through_volume = options.through_volume,
                                      .except_thin = options.except_thin};
     PolygonMesh copy;
     const PolygonMesh& polygons = Inside::sampled(mesh, copy);

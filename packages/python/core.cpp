@@ -516,7 +516,7 @@ void bind_functions(py::module_& m) {
   m.def("remesh_within", [](const Mesh& mesh, std::optional<double> error,
                             std::optional<std::size_t> triangles, const std::string& signs, bool over_holes,
                             double smallest_voxel, double limit_points, bool written_in_single, Thin thin,
-                            bool except_thin, Watch& watch) {
+                            bool except_thin, bool through_volume, Watch& watch) {
     const BoundedRemesh made = watched(watch, [&](Context& context) {
       return remesh_within(mesh,
                            {.error = error,
@@ -527,6 +527,7 @@ void bind_functions(py::module_& m) {
                             .most_points = limit_points,
                             .written_in_single = written_in_single,
                             .thin = thin,
+                            .through_volume = through_volume,
                             .except_thin = except_thin},
                            context);
     });

@@ -435,14 +435,15 @@ class BoundedRemesh(NamedTuple):
     error: float  # the requested one or, for a budget, the one found
     to_polygons: float  # bound of the distance from the mesh to the boundary of the polygons' solid
     from_polygons: float  # bound of the distance from that boundary to the mesh
-    voxel_size: float
+    voxel_size: float  # 0: no volume was made
     exceptions: list[ExceptedBall]  # with except_thin, balls outside of which the bounds hold
 
 
 def remesh_within(mesh: MeshLike, *, error: float | None = None, triangles: int | None = None,
                   signs: str = "winding-number", over_holes: bool = False, smallest_voxel: float = 0.0,
                   limit_points: float = 3e7, written_in_single: bool = False, thin: str = "keep",
-                  except_thin: bool = False, progress: Progress | None = None, cancel: _IsSet | None = None,
+                  except_thin: bool = False, through_volume: bool = False,
+                  progress: Progress | None = None, cancel: _IsSet | None = None,
                   threads: int | None = None, log: Log | None = None) -> BoundedRemesh:
     """Returns a mesh with a certified two-sided distance of at most `error` (world units) to the boundary of
     the polygons' solid, or with at most `triangles` and the smallest certified error found. Closed, manifold
@@ -452,13 +453,14 @@ def remesh_within(mesh: MeshLike, *, error: float | None = None, triangles: int 
     of the error) and limit_points limit the work; beyond them the function raises hermesh.Error with location
     and reason. thin is as in remesh(); with "drop" and "refuse" a part that is too thin is an error.
     except_thin lets the bound hold except in the balls of `exceptions`, around such parts and holes, with a
-    note, instead of raising an error.
+    note, instead of raising an error. A mesh that is closed, manifold and free of self-intersection is
+    simplified as it is, without a volume, unless through_volume is set.
     """
     mesh = as_mesh(mesh)
     with _Watching(progress, cancel, threads, log) as watch:
         *made, exceptions = _core.remesh_within(mesh, error, triangles, signs, over_holes, smallest_voxel,
                                                 limit_points, written_in_single, _thin(thin), except_thin,
-                                                watch)
+                                                through_volume, watch)
     return BoundedRemesh(*made, [ExceptedBall(*ball) for ball in exceptions])
 
 

@@ -316,7 +316,7 @@ def remesh(mesh: Mesh, voxelizing: VoxelizeOptions, extracting: ExtractOptions, 
 
 def remesh_within(mesh: Mesh, error: float | None, triangles: int | None, signs: str, over_holes: bool,
                   smallest_voxel: float, limit_points: float, written_in_single: bool, thin: Thin,
-                  except_thin: bool, watch: Watch, /) -> tuple[
+                  except_thin: bool, through_volume: bool, watch: Watch, /) -> tuple[
                       Mesh, float, float, float, float, list[tuple[list[float], float, float, float, bool]]]:
     ...
 

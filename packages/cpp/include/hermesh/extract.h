@@ -78,6 +78,9 @@ struct BoundOptions {
   double most_points = 3e7;              ///< maximum number of vertices of the finest mesh
   bool written_in_single = false;        ///< as in ExtractOptions
   Thin thin = Thin::keep;  ///< otherwise a part that the smallest voxels do not show is an error
+  /// True if a volume is made even if the polygons are a closed, manifold mesh free of self-intersection,
+  /// which is otherwise simplified as it is.
+  bool through_volume = false;
   /// True if the bound need not hold around holes, walls and gaps that no voxel size shows; otherwise these
   /// are an error.
   bool except_thin = false;
@@ -98,7 +101,7 @@ struct BoundedRemesh {
   double error = 0.0;          ///< the requested one or, for a budget, the one found
   double to_polygons = 0.0;    ///< bound of the distance from the mesh to the boundary of the polygons' solid
   double from_polygons = 0.0;  ///< bound of the distance from that boundary to the mesh
-  double voxel_size = 0.0;
+  double voxel_size = 0.0;     ///< 0: no volume was made
   /// With `except_thin`, balls outside of which the bounds hold, those with the largest distance first.
   std::vector<ExceptedBall> exceptions = {};
 };
