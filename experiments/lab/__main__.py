@@ -8,7 +8,7 @@ import os
 import pathlib
 import sys
 
-from . import baseline, benchmark, claims, compare, driver, listing, merge, tables
+from . import baseline, benchmark, claims, compare, driver, listing, merge, release, tables
 from .rows import LabError
 
 # Options that hermesh passes to each command; commands that do no work of their own ignore them.
@@ -50,7 +50,8 @@ def check_log(parser, arguments):
 def main(words=None):
     parser = Parser(prog="hermesh", description="Runs experiments and reads their rows.")
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
-    for module in (driver, tables, claims, compare, baseline, merge, listing, benchmark):
+    for module in (driver, tables, claims, compare, baseline, merge, listing, benchmark,
+                   release):
         module.add_command(commands)
     for command in commands.choices.values():
         for option, settings in COMMON.items():

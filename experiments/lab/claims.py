@@ -41,6 +41,7 @@ class Judged:
     reason: str = ""  # of a missing verdict
     values: dict = dataclasses.field(default_factory=dict)  # ours, by column
     warnings: list = dataclasses.field(default_factory=list)  # rows that cannot be trusted
+    accepted: bool = False  # True if rows other than those of the run decided
 
 
 def read_toml(path):
@@ -125,6 +126,16 @@ def judge(claim, rows):
     if judged.verdict == "contradicted" and len(claim.why) < 2:
         judged.verdict, judged.reason = (
             "missing", 'contradicted, but "why" does not explain it in two sentences')
+    return judged
+
+
+def judge_with(claim, rows, accepted):
+    """Evaluates a claim on rows, or on other rows (or None) if these give no verdict."""
+    judged = judge(claim, rows)
+    if judged.verdict == "missing" and accepted:
+        other = judge(claim, accepted)
+        if other.verdict != "missing":
+            return dataclasses.replace(other, accepted=True)
     return judged
 
 
@@ -229,6 +240,8 @@ def _verdict_text(claim, judged):
     text = f"**{judged.verdict}**" if judged.verdict == "contradicted" else judged.verdict
     if claim.why and judged.verdict != "missing":
         text += ". " + " ".join(claim.why)
+    if judged.accepted:
+        text += " (decided by accepted rows: this run has no such size or model)"
     return text + "".join(f" ({warning})" for warning in judged.warnings)
 
 
@@ -255,7 +268,7 @@ def as_json(verdicts):
     """Returns [(claim, judged)] as JSON."""
     entries = [{"id": claim.id, "place": claim.place, "says": claim.says, "kind": claim.kind,
                 "printed": claim.printed, "ours": judged.values, "tests": claim.tests,
-                "verdict": judged.verdict,
+                "verdict": judged.verdict, "accepted": judged.accepted,
                 "reason": judged.reason, "why": claim.why, "warnings": judged.warnings}
                for claim, judged in verdicts]
     return json.dumps(entries, indent=1, ensure_ascii=False) + "\n"
@@ -268,6 +281,9 @@ def add_command(subparsers):
                         help="claims and their rules (default: paper/claims.toml)")
     parser.add_argument("--results", type=pathlib.Path, default=ROOT / "results",
                         help="directory of directories with rows.jsonl (default: results)")
+    parser.add_argument("--accepted", type=pathlib.Path,
+                        help="directory like that of --results, whose rows decide the claims that those of "
+                        "--results do not")
     parser.add_argument("--id", default="", help="only claims whose id contains this text")
     parser.add_argument("--of", help="only claims on this table or figure of the thesis, e.g. table_9_2")
     parser.add_argument("--format", choices=["md", "json"], default="md", help="default: md")
@@ -290,6 +306,10 @@ def run(arguments):
                  for problem in rules_that_cannot_fail(claim, rows)]
         print("".join(problem + "\n" for problem in wrong), end="")
         return 3 if wrong else 0
-    verdicts = [(claim, judge(claim, rows)) for claim in claims]
+    accepted = None
+    if arguments.accepted:
+        accepted = RowDatabase()
+        accepted.add_directories(arguments.accepted)
+    verdicts = [(claim, judge_with(claim, rows, accepted)) for claim in claims]
     print(markdown(verdicts) if arguments.format == "md" else as_json(verdicts), end="")
     return 3 if any(judged.verdict == "missing" for _, judged in verdicts) else 0

@@ -25,7 +25,7 @@ import time
 from . import ablations, child, compare, experiment, merge, models, stale, tables, upkeep
 from .child import DataMissing, InputUnreadable
 from .program import check_may_be_kept, load_program, provenance, sha256_of
-from .rows import LabError, append_rows, drop_torn_row, find, read_rows, readable, text_at, to_json
+from .rows import ROOT, LabError, append_rows, drop_torn_row, find, read_rows, readable, text_at, to_json
 
 USUAL_SECONDS, USUAL_SHARE_OF_MEMORY = 3600, 0.8  # limits of a cell if neither the user nor the file has any
 MOST_SHARDS = 10_000
@@ -77,6 +77,7 @@ class Run:
         self.own_run, self.earlier_run = self.head["run"], ""
         self.start, self.position = time.monotonic(), ""
         self.existing = {}  # rows of earlier runs by cell, then by case/label
+        self.tables_of_earlier_run = set()  # each a _table_of()
         self.notes = {}  # as keys, so that each is there once
         self.inputs, self.rows, self.reused = {}, [], 0
 
@@ -166,16 +167,18 @@ class Run:
         for row in read_rows(self.file):
             if "cell" in row and row | own == row:
                 self.existing.setdefault(row["cell"], {})[_key_of(row)] = row
-                self.earlier_run = text_at(row, "/run")
+                if self.earlier_run != text_at(row, "/run"):
+                    self.earlier_run, self.tables_of_earlier_run = text_at(row, "/run"), set()
+                self.tables_of_earlier_run.add(_table_of(row))
 
     def _existing_rows(self, group, cells):
-        """Returns the rows of a group if all exist, of the present data.
+        """Returns the rows of a group if all exist, of the present data and outside programs.
 
-        Some of a group are of no use, because its cells take turns. Nor are those of outside programs, which
-        may have changed.
+        Some of a group are of no use, because its cells take turns.
         """
         found = [[None, *self.existing.get(cell, {}).values()][-1] for cell in cells.values()]
-        if None in found or any(variant["command"] for variant in group["variants"]):
+        programs = [outside_hash(variant["command"]) for variant in group["variants"]]
+        if None in found or any(row.get("outside", "") != now for row, now in zip(found, programs)):
             return []
         try:
             place, now = "/case/sha256", self._input_hash(group["case"]["name"], group["sweep"])
@@ -196,9 +199,10 @@ class Run:
         self.reused += len(rows)
         if rows:
             return rows
-        # Rows that complete an interrupted run join it, because a table has rows of one run. Rows of other
-        # data do not.
-        joins = self.earlier_run and not any(cell in self.existing for cell in cells.values())
+        # Groups that an interrupted run did not reach join it. Where it has rows of the same table, which are
+        # of other data or of the file before it was edited, the new rows replace them as those of a new run.
+        shown = self._failed(group, group["variants"][0], "")
+        joins = self.earlier_run and _table_of(shown) not in self.tables_of_earlier_run
         self.head["run"] = self.earlier_run if joins else self.own_run
         try:
             rows = self._rows_apart(group)
@@ -206,6 +210,10 @@ class Run:
             missing = {"data_missing": True} if isinstance(error, DataMissing) else {}
             rows = [self._failed(group, variant, str(error)) | missing for variant in group["variants"]]
         rows = [row | {"cell": cells[text_at(row, "/variant/label")]} for row in rows]
+        outside = {each["label"]: outside_hash(each["command"]) for each in group["variants"]
+                   if each["command"]}
+        rows = [row | ({"outside": outside[text_at(row, "/variant/label")]}
+                       if text_at(row, "/variant/label") in outside else {}) for row in rows]
         tables.add_ratios(rows)
         append_rows(self.file, rows)
         return rows
@@ -407,6 +415,23 @@ def with_own_measurements(description):
 
 def _key_of(row):
     return f"{text_at(row, '/case/name')}/{text_at(row, '/variant/label')}"
+
+
+def _table_of(row):
+    """Returns what the rows of one table of a run agree in."""
+    parts = "/case/name", "/resolution", "/voxelization/label", "/sweep/parameter"
+    return tuple(text_at(row, part) for part in parts)
+
+
+def outside_hash(command):
+    """Returns a hash of a command, its program and the files that it names; "" if there is no command."""
+    if not command:
+        return ""
+    words = re.split(r"\s+", command.replace("{source}", str(ROOT)))
+    files = [os.path.realpath(word) if os.path.isfile(word) else shutil.which(word) or "" for word in words
+             if word and "{" not in word]
+    digests = [sha256_of(pathlib.Path(file)) if os.path.isfile(file) else "" for file in files]
+    return hashlib.sha256(to_json([command, digests]).encode()).hexdigest()[:16]
 
 
 def exit_code(rows):

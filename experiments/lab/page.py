@@ -54,7 +54,7 @@ def _cell(column, row):
     value = value_of(column, row)
     if plots.as_number(value) is not None:
         return [cell_text(column, row), value]
-    return value if value is None or isinstance(value, str) else to_json(value)
+    return value if value is None else cell_text(column, row) if isinstance(value, str) else to_json(value)
 
 
 def _histories(rows, number):
@@ -448,7 +448,7 @@ def write_page(path, count, out):
     rows, path = read_rows(path), pathlib.Path(path)
     directory, notes = path if path.is_dir() else path.parent, []
     # Earlier runs come first, because a table shows its last run.
-    rows = plots.with_current_plots(_baseline_rows(directory.resolve(), rows) + rows, directory)
+    rows = plots.as_asked_today(_baseline_rows(directory.resolve(), rows) + rows, directory)
     meshes = page_meshes(directory, rows, USUAL_MESHES if count is None else count, notes)
     page = html_page(f"hermesh: {directory.resolve().name}", rows, meshes)
     (directory / "report.html").write_text(page)

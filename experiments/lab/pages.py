@@ -15,7 +15,7 @@ import hashlib
 import pathlib
 import re
 
-from . import ablations, claims, experiment, tables
+from . import ablations, claims, experiment, plots, tables
 from .database import RowDatabase
 from .rows import LabError, find, latest_groups, readable, text_at
 
@@ -175,6 +175,8 @@ class Pages:
         self.names, self.numbers, self.queries, self.plain = read.values()
         self.rows = RowDatabase()
         self.rows.add_directories(self.root / "results")
+        self.shown = {name: plots.as_asked_today(rows, self.root / "results" / name)
+                      for name, rows in self.rows.rows_of.items()}
 
     @functools.cached_property
     def verdicts(self):
@@ -185,7 +187,7 @@ class Pages:
     def tables(self):
         """Returns {path from the root: text} of the table.md of each directory."""
         return {f"results/{name}/table.md": tables.markdown_report(rows)
-                for name, rows in self.rows.rows_of.items()}
+                for name, rows in self.shown.items()}
 
     def sums(self):
         """Returns the hashes of all files of rows."""
@@ -219,9 +221,9 @@ class Pages:
         return number_text(*self.numbers[marker], self.rows)
 
     def _rows_of(self, directory):
-        if directory not in self.rows.rows_of:
+        if directory not in self.shown:
             raise LabError(f"there is no results/{directory}/rows.jsonl")
-        return self.rows.rows_of[directory]
+        return self.shown[directory]
 
     def _tables_of(self, directory, subject, resolution=None):
         groups = [group for group in latest_groups(self._rows_of(directory))

@@ -38,26 +38,30 @@ class Curve:
 
 
 @functools.cache
-def _current_plots(name):
-    """Returns the plots of the project's experiment of this name; None if there is no such experiment."""
+def _current(name):
+    """Returns the plots and columns of the project's experiment of this name, {} if there is none."""
     for found in experiment.list_experiments():
         if found["name"] == name:
-            plots = tomllib.loads(found["file"].read_text()).get("plots", [])
-            return [experiment.plot(None, None)(plot, found["file"].name) for plot in plots]
-    return None
+            read = tomllib.loads(found["file"].read_text())
+            plots = [experiment.plot(None, None)(plot, found["file"].name) for plot in read.get("plots", [])]
+            return {"plots": plots} | ({"columns": read["columns"]} if "columns" in read else {})
+    return {}
 
 
-def with_current_plots(rows, directory):
-    """Returns the rows with the plots that their experiment's file asks for today.
+def as_asked_today(rows, directory):
+    """Returns the rows with the plots and columns that their experiment's file asks for today.
 
-    Rows of a directory outside of results/, or in results/local, keep their own plots, since another
-    experiment may have the name of one of the project's. So do rows of experiments that no longer exist.
+    Rows of a directory outside of results/, or in results/local, keep their own, since another experiment may
+    have the name of one of the project's. So do rows of experiments that no longer exist. Rows of baselines
+    keep their columns, which are those that are compared.
     """
     directory, results = pathlib.Path(directory).resolve(), ROOT / "results"
     if not directory.is_relative_to(results) or directory.is_relative_to(results / "local"):
         return rows
-    current = ((row, _current_plots(text_at(row, "/experiment"))) for row in rows)
-    return [row if plots is None else row | {"plots": plots} for row, plots in current]
+    keys = ("plots",) if directory.is_relative_to(results / "baselines") else ("plots", "columns")
+    found = ((row, _current(text_at(row, "/experiment"))) for row in rows)
+    return [row | {key: current[key] for key in keys if key in current and (key == "plots" or key in row)}
+            for row, current in found]
 
 
 def plotted_rows(rows):
@@ -104,13 +108,14 @@ def interval_of(name, row):
 
 
 def curves_of(plot, rows):
-    """Returns the curves of a plot, one for each label or, with by_variant, for each method.
+    """Returns the curves of a plot, one for each label or, with by_variant, for each method, which has the
+    name of its label if it has only one.
 
     Columns of y after the first do not depend on the method, e.g. times that the thesis prints: they are
     taken from the rows of the first label and are called by their header. With categories, each column of y
     is one curve, and x numbers the labels from 0, sorted by their least value of plot["x"].
     """
-    who, scale, curves = label_pointer(plot), 100 if plot["percent"] else 1, {}
+    who, scale, curves, labels = label_pointer(plot), 100 if plot["percent"] else 1, {}, {}
     chosen = [(i, row, number_in(plot["x"], row)) for i, row in enumerate(rows)
               if plot["case"] in ("", text_at(row, "/case/name"))
               and plot["resolution"] in (0, row.get("resolution", 0))]
@@ -119,6 +124,8 @@ def curves_of(plot, rows):
         for _, row, x in sorted(chosen, key=lambda each: each[2] or 0):
             least.setdefault(text_at(row, who), len(least))
         chosen = [(i, row, least[text_at(row, who)]) for i, row, _ in chosen]
+    for _, row, _ in chosen:
+        labels.setdefault(text_at(row, who), {})[text_at(row, "/variant/label")] = True
     for i, row, x in chosen:
         label = text_at(row, who)
         if x is None or (plot["log_x"] and not plot["categories"] and x <= 0):
@@ -128,7 +135,8 @@ def curves_of(plot, rows):
             is_further = number > 0 and label != text_at(rows[0], who) and not plot["categories"]
             if y is None or (plot["log_y"] and y <= 0) or is_further:
                 continue
-            name = _column(row, column).header if number > 0 or plot["categories"] else label
+            own = list(labels[label])[0] if len(labels[label]) == 1 else label
+            name = _column(row, column).header if number > 0 or plot["categories"] else own
             ends = [None if end is None else scale * end for end in interval_of(column, row)]
             curves.setdefault(name, Curve(name, column)).points.append(Point(x, scale * y, i, *ends))
     for curve in curves.values():
@@ -235,7 +243,7 @@ def write_plots(rows, directory, out):
     Plots without a point are left out. Rows in results/ are drawn as their experiment's file asks today.
     """
     with style():
-        for name, own, plots in plotted_rows(with_current_plots(rows, directory)):
+        for name, own, plots in plotted_rows(as_asked_today(rows, directory)):
             numbers = {}  # a label has the same style in all plots of an experiment
             for plot in plots:
                 curves = curves_of(plot, own)

@@ -23,7 +23,7 @@ class Column:
     header: str
     meaning: str
     pointer: str
-    unit: str = ""  # "voxel", "mebibyte" or ""
+    unit: str = ""  # "voxel", "mebibyte", "guarantees" or ""
 
 
 @functools.cache
@@ -80,7 +80,7 @@ def to_json(value):
 def value_of(column, row):
     """Returns the column's value in its unit, None if the row has none."""
     value = find(row, column.pointer)
-    if value is None or not column.unit:
+    if value is None or column.unit not in ("voxel", "mebibyte"):
         return value
     return value / (find(row, "/voxel_size") if column.unit == "voxel" else 2**20)
 
@@ -90,7 +90,19 @@ def cell_text(column, row):
     value = value_of(column, row)
     if isinstance(value, (int, float)) and not isinstance(value, bool):
         return readable(value)
+    if column.unit == "guarantees":
+        return guarantees_text(value)
     return value if isinstance(value, str) else "–"
+
+
+def guarantees_text(letters):
+    """Returns the words of "cmoi kept": closed, manifold, oriented, no self-intersection: verified."""
+    names = {"c": "closed", "m": "manifold", "o": "oriented", "i": "no self-intersection"}
+    verdicts = {"kept": "verified", "BROKEN": "VIOLATED", "unchecked": "not checked"}
+    found, _, verdict = (letters or "–").partition(" ")
+    if verdict not in verdicts or set(found) - set(names):
+        return letters or "–"
+    return f"{', '.join(names[letter] for letter in found)}: {verdicts[verdict]}"
 
 
 def readable(value):

@@ -25,7 +25,6 @@ _LATEX = str.maketrans({
     "\\": "\\textbackslash{}", "~": "\\textasciitilde{}", "^": "\\textasciicircum{}", "÷": "$\\div$",
     "×": "$\\times$", "°": "$^\\circ$", "–": "--", "·": "$\\cdot$", "→": "$\\to$",
     **{letter: "\\" + letter for letter in "&%$#_{}"}})
-_TEXT_COLUMNS = ("promises", "options", "fingerprint")  # aligned to the left, unlike numbers
 
 
 def has(row, pointer):
@@ -48,6 +47,11 @@ def shown_columns(rows):
     if names is None:
         return list(all_columns())
     return [column for name in names for column in all_columns() if column.name == name]
+
+
+def _is_text(column, rows):
+    """Returns True if a column has texts, which are aligned to the left."""
+    return any(isinstance(value_of(column, row), str) for row in rows)
 
 
 def first_column(row):
@@ -158,6 +162,23 @@ def alarms(row):
     return sentences
 
 
+LONGEST_CELL = 64  # characters of a text; the rest of a longer one is a footnote
+
+
+def _with_footnotes(body):
+    """Returns the cells with long texts shortened to what precedes their first colon, and the footnotes."""
+    notes = {}
+
+    def short(cell):
+        head, colon, rest = cell.partition(": ")
+        if len(cell) <= LONGEST_CELL or not colon or len(head) > LONGEST_CELL:
+            return cell
+        return f"{head} [{notes.setdefault(rest, len(notes) + 1)}]"
+
+    shown = [[line[0], *map(short, line[1:])] for line in body]
+    return shown, [f"[{number}] {rest}" for rest, number in notes.items()]
+
+
 def group_alarms(group):
     """Returns the alarms of all rows of a group."""
     return [sentence for row in group.rows for sentence in alarms(row)]
@@ -179,13 +200,14 @@ def markdown_table(group):
     if group.earlier_runs > 0:
         facts.append(f"earlier runs of these cells in the same folder, not shown: {group.earlier_runs}")
     head, *body = _cells(group)
+    body, footnotes = _with_footnotes(body)
     body = [[cell.translate(_MARKDOWN) for cell in line] for line in body]
     widths = [max(3, *map(len, cells)) for cells in zip(head, *body)]
-    left = [True] + [column.name in _TEXT_COLUMNS for column in shown_columns(group.rows)]
+    left = [True] + [_is_text(column, group.rows) for column in shown_columns(group.rows)]
     aligned = [f" {{:{'<' if is_left else '>'}{width}}} |" for is_left, width in zip(left, widths)]
     rule = ["-" * width if is_left else "-" * (width - 1) + ":" for is_left, width in zip(left, widths)]
     table = "".join("|" + "".join(aligned).format(*line) + "\n" for line in [head, rule, *body])
-    notes = [f"- {sentence.translate(_MARKDOWN)}\n" for sentence in stage_sentences(group)]
+    notes = [f"- {sentence.translate(_MARKDOWN)}\n" for sentence in [*footnotes, *stage_sentences(group)]]
     notes += [f"- **{sentence.translate(_MARKDOWN)}**\n" for sentence in group_alarms(group)]
     title = f"### {group_title(group.rows[0]).translate(_MARKDOWN)}\n\n"
     facts = "".join(f"- {fact}\n" for fact in facts)
@@ -362,11 +384,5 @@ def run(arguments, parser):
         write_plots(read_rows(arguments.directory), arguments.directory, sys.stdout)
     else:
         report = {"md": markdown_report, "csv": csv_text, "tex": latex_report}[arguments.format]
-        sys.stdout.write(report(read_rows(arguments.directory)))
+        sys.stdout.write(report(plots.as_asked_today(read_rows(arguments.directory), arguments.directory)))
     return 0
-def _report(rows, arguments):
-    if arguments.format == "plots":
-        write_plots(rows, arguments.directory, sys.stdout)
-    else:
-        text = {"md": markdown_report, "csv": csv_text, "tex": latex_report}[arguments.format]
-        sys.stdout.write(text(rows))

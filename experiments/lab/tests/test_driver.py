@@ -14,7 +14,7 @@ import unittest
 from unittest import mock
 
 from .. import child, driver, merge, program, stale
-from ..rows import LabError, append_rows, read_rows, text_at
+from ..rows import LabError, append_rows, latest_groups, read_rows, text_at
 
 TOY = pathlib.Path(__file__).parent / "toy_cell.py"
 NAMES = ("good good2 crashing hanging talking hungry forking leaving refusing garbled slow poisonous fragile "
@@ -78,7 +78,9 @@ class Runs(unittest.TestCase):
     def run_toys(self, *words, out=None):
         """Runs the experiment with these words of the command line; returns the exit code."""
         usual = ["--out", out or self.out, "--timeout", "20", "--quiet"]
-        code, self.said = driver.Run(driver.arguments_of(self.file, *usual, *words), PROGRAM).execute()
+        run = driver.Run(driver.arguments_of(self.file, *usual, *words), PROGRAM)
+        code, self.said = run.execute()
+        self.notes = list(run.notes)
         return code
 
     def rows(self):
@@ -200,6 +202,35 @@ class Resume(Runs):
         append_rows(self.out / "rows.jsonl", rows)
         self.run_toys()
         self.assertEqual(len(self.rows()), 4)
+
+    def test_rows_of_an_edited_file_replace_those_before(self):
+        self.write("good good2", TWO_CASES)
+        self.run_toys()
+        for before, after in (("pixels = 0", "pixels = 0\nsamples = 7"), ("good2", "slow")):
+            text = self.file.read_text()
+            self.assertIn(before, text)
+            self.file.write_text(text.replace(before, after))
+            self.run_toys()
+            groups = latest_groups(self.rows())
+            self.assertEqual([len(group.rows) for group in groups], [2, 2, 2], after)
+        self.assertEqual([text_at(row, "/variant/label") for row in groups[0].rows], ["good", "slow"])
+
+    def test_cells_of_an_unchanged_outside_program_are_not_run_again(self):
+        tool = self.root / "tool"
+        tool.write_text("#!/bin/sh\n")
+        self.write("good")
+        mine = f'{{ label = "mine", command = "sh {tool} {{in}} {{out}}" }}'
+        self.file.write_text(self.file.read_text().replace('{ name = "good" }', '{ name = "good" }, ' + mine))
+        self.run_toys()
+        count = len(self.rows())
+        self.run_toys()
+        self.assertEqual(len(self.rows()), count)
+        self.assertIn("2 cells were in", " ".join(self.notes))
+        tool.write_text("#!/bin/sh\nexit 1\n")
+        self.run_toys()
+        self.assertEqual(len(self.rows()), 2 * count)
+        self.assertEqual(driver.outside_hash(""), "")
+        self.assertNotEqual(driver.outside_hash("sh {in}"), driver.outside_hash("sh {out}"))
 
     def test_unreadable_cases_fail_alone_and_are_run_again_when_they_can_be_read(self):
         mesh = self.root / "mesh.off"

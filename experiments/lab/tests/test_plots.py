@@ -38,6 +38,7 @@ class Curves(unittest.TestCase):
         rows = [row_of("a", 2, 0.5), row_of("b", 2, 0.1), row_of("a", 1, 0.25), row_of("b", 1, 0)]
         self.assertEqual(curves(rows), {"a": [(1, 25), (2, 50)], "b": [(1, 0), (2, 10)]})
         self.assertEqual(curves(rows[:2], by_variant=True), {"v": [(2, 10), (2, 50)]})
+        self.assertEqual(curves(rows[:1], by_variant=True), {"a": [(2, 50)]})
 
     def test_further_columns_have_one_curve_from_the_first_label(self):
         found = curves([row_of("a", 1, 0.25), row_of("b", 1, 0), row_of("a", 2, 0.5)],
@@ -160,10 +161,10 @@ class CurrentPlots(unittest.TestCase):
         row = row_of("a", 1, 0.5, experiment="pareto", plots=[])
         for directory, is_kept in ((ROOT / "results/pareto", True), (ROOT / "results/local/pareto", False),
                                    (pathlib.Path("/somewhere/results/pareto"), False)):
-            names = [plot["name"] for plot in plots.with_current_plots([row], directory)[0]["plots"]]
+            names = [plot["name"] for plot in plots.as_asked_today([row], directory)[0]["plots"]]
             self.assertEqual("dragon" in names, is_kept, directory)
         own = row_of("a", 1, 0.5, experiment="no such experiment")
-        self.assertEqual(plots.with_current_plots([own], ROOT / "results/pareto"), [own])
+        self.assertEqual(plots.as_asked_today([own], ROOT / "results/pareto"), [own])
 
 
 if __name__ == "__main__":

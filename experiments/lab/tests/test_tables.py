@@ -36,10 +36,10 @@ def lines_with(text, part):
 class Markdown(unittest.TestCase):
     def test_shows_the_named_columns_in_their_units(self):
         table = markdown(row_of(seconds=0.25), row_of(label="b | é", seconds=2.5))
-        self.assertIn("| variant | triangles | time [s] | to max [vx] | peak [MiB] | promises |\n"
-                      "| ------- | --------: | -------: | ----------: | ---------: | -------- |\n"
-                      "| a       | 1,234,567 |     0.25 |        0.25 |        1.5 | c kept   |\n"
-                      "| b \\| é  | 1,234,567 |      2.5 |        0.25 |        1.5 | c kept   |\n", table)
+        self.assertIn("| variant | triangles | time [s] | to max [vx] | peak [MiB] | guarantees       |\n"
+                      "| ------- | --------: | -------: | ----------: | ---------: | ---------------- |\n"
+                      "| a       | 1,234,567 |     0.25 |        0.25 |        1.5 | closed: verified |\n"
+                      "| b \\| é  | 1,234,567 |      2.5 |        0.25 |        1.5 | closed: verified |\n", table)
         self.assertTrue(table.startswith("### ball at resolution 40\n"))
         self.assertEqual(len(lines_with(table, "data folder, sha256 abcdef012345, 1,280 triangles")), 1)
         self.assertEqual(len(lines_with(table, "commit 0123456789ab with changes")), 1)
@@ -56,6 +56,24 @@ class Markdown(unittest.TestCase):
             self.assertEqual(len(lines_with(table, f"- **{sentence}")), 1, sentence)
         self.assertEqual(lines_with(table, "| bad ")[0].replace(" ", "").split("|")[3:5], ["–", "–"])
         self.assertEqual(tables.alarms(row_of()), [])
+
+    def test_guarantees_are_words(self):
+        for letters, words in (("cmoi kept", "closed, manifold, oriented, no self-intersection: verified"),
+                               ("cm BROKEN", "closed, manifold: VIOLATED"), ("i unchecked", "no self-"
+                               "intersection: not checked"), ("none", "none"), ("FAILED", "FAILED")):
+            self.assertIn(f"| {words} |\n", markdown(row_of(promise_letters=letters)).replace("  ", ""))
+
+    def test_long_texts_are_footnotes(self):
+        columns = [{"name": "outcome", "header": "outcome", "meaning": "what happened"}]
+        reason = "the error is not kept at (1, 2, 3); the surfaces are farther apart: raise the error, or more"
+        rows = [row_of(label=label, measurement={"parameters": "n=1", "seed": 7}, values={"outcome": outcome},
+                       table={"title": "t", "columns": columns})
+                for label, outcome in (("a", f"refused: {reason}"), ("b", "certified"),
+                                       ("c", f"refused: {reason}"), ("d", "refused: a hole"))]
+        table = markdown(*rows)
+        self.assertEqual(table.count("| refused [1] "), 2)
+        self.assertIn(f"- [1] {reason}\n", table)
+        self.assertIn("| d       | refused: a hole |\n", table)
 
     def test_stand_ins_are_marked(self):
         stand_in = row_of(case={"name": "ball", "origin": "stand-in: no network"})
@@ -96,7 +114,7 @@ class OtherFormats(unittest.TestCase):
     def test_latex_escapes(self):
         text = tables.latex_table(RowGroup([row_of(label="50 % of a_b & {c}\\")]))
         label = "50 \\% of a\\_b \\& \\{c\\}\\textbackslash{}"
-        self.assertIn(f"\n{label} & 1,234,567 & 1 & 0.25 & 1.5 & c kept \\\\\n", text)
+        self.assertIn(f"\n{label} & 1,234,567 & 1 & 0.25 & 1.5 & closed: verified \\\\\n", text)
         self.assertIn("\\begin{tabular}{lrrrrr}", text)
 
     def test_csv_has_all_rows_all_columns_and_full_numbers(self):
