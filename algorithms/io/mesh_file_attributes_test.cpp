@@ -170,6 +170,12 @@ TEST_F(AttributeFileTest, ObjCorners) {
                                         1, 0, 0, 1, 0, 0, 1, 0, 0, 1, 0, 0, 1, 1, 0, 0, 0, 0, 1}));
 }
 
+TEST_F(AttributeFileTest, ObjWeightsDivideCoordinates) {
+  const MeshFile file = obj("v 2 4 6 2\nv 1 0 0 .25 .5 1\nv 0 1 0 4 1 0 .5\nf 1 2 3\n");
+  EXPECT_EQ(file.points, (std::vector<Eigen::Vector3d>{{1, 2, 3}, {1, 0, 0}, {0, 0.25, 0}}));
+  EXPECT_FALSE(context.notes.empty());
+}
+
 TEST_F(AttributeFileTest, ObjColours) {
   const MeshFile file = obj("v 0 0 0 1\nv 1 0 0 .25 .5 1\nv 0 1 0 1 1 0 .5 # weight and colour\nf 1 2 3\n");
   ASSERT_EQ(file.attributes.size(), 1u);

@@ -39,6 +39,8 @@ class ObjReader {
     if (left_out_ > 0)
       builder_.note("it holds curves, surfaces or calls of other files on ", left_out_,
                     " lines, which are not read; the mesh lacks them");
+    if (weighted_ > 0)
+      builder_.note(weighted_, " of its points have a weight, by which their coordinates were divided");
     builder_.note_padding(bytes_);
     if (builder_.attributes()) finish_attributes();
   }
@@ -79,23 +81,14 @@ class ObjReader {
     }
   }
 
-  /// Reads a point, whose coordinates may be followed by a weight or a colour.
+  /// Reads a point, whose coordinates may be followed by a weight, by which they are divided, a colour, or
+  /// both in this order.
   void read_point() {
     Eigen::Vector3d point;
     for (double& x : point) {
       skip_blanks();
       x = cursor_.number<double>("a number");
     }
-    builder_.mesh.points.push_back(point);
-    if (builder_.attributes()) read_colour();
-    skip_continued_line();
-  }
-
-  /// Reads the colour of the newest point: three numbers, or the last three of four, a weight being the
-  /// first.
-  void read_colour() {
-    AttributeTable& attributes = *builder_.attributes();
-    attributes.begin(AttributeDomain::point);
     std::array<double, 4> numbers{};
     std::size_t count = 0;
     bool good = true;
@@ -104,7 +97,18 @@ class ObjReader {
       good = good && number;
       numbers[count++] = number.value_or(0.0);
     }
-    // A single number is the weight of a rational curve, two have no meaning.
+    const double weight = good && (count == 1 || count == 4) ? numbers[0] : 1.0;
+    if (weight != 1.0 && weight != 0.0) point /= weight, ++weighted_;
+    builder_.mesh.points.push_back(point);
+    if (builder_.attributes()) add_colour(numbers, count, good);
+    skip_continued_line();
+  }
+
+  /// Adds the colour of the newest point: three numbers, or the last three of four.
+  void add_colour(const std::array<double, 4>& numbers, std::size_t count, bool good) {
+    AttributeTable& attributes = *builder_.attributes();
+    attributes.begin(AttributeDomain::point);
+    // A single number is a weight, two have no meaning.
     if (count < 3 && good) return;
     if (!colour_) colour_ = attributes.add("colour", AttributeDomain::point, 3, false);
     if (!good) return attributes.spoil_value(*colour_, "is no number");
@@ -223,6 +227,7 @@ class ObjReader {
   TextCursor cursor_;
   MeshBuilder& builder_;
   std::string_view bytes_;
+  std::size_t weighted_ = 0;  ///< points that were divided by a weight
   std::size_t left_out_ = 0;  ///< lines with other geometry than points and polygons
   std::vector<std::int64_t> corners_;
   // For attributes.

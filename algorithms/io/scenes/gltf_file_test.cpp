@@ -166,6 +166,10 @@ TEST_F(GltfFileTest, BuffersAreWithinTheFileOrBesideIt) {
   write("the buffer.bin", gltf.binary);
   gltf.buffers = R"([{"byteLength":44,"uri":"the%20buffer.bin"}])";
   EXPECT_EQ(read_mesh_file(write("a.gltf", gltf.json()), context).points.size(), 3u);
+  // Not encoded, as some programs write names.
+  write("10% über.bin", gltf.binary);
+  gltf.buffers = R"([{"byteLength":44,"uri":"10% über.bin"}])";
+  EXPECT_EQ(read_mesh_file(write("c.gltf", gltf.json()), context).points.size(), 3u);
   // 42 bytes in base64, by hand of another program.
   gltf.buffers = R"([{"byteLength":42,"uri":"data:application/gltf-buffer;base64,)"
                  R"(AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAAAAAAAAAEAAAAAAAAABAAIA"}])";

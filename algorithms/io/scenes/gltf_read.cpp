@@ -121,11 +121,14 @@ std::string bytes_of_uri(std::string_view uri, const MeshBuilder& builder) {
   // A colon before any slash ends the scheme of an address, such as https.
   if (uri.substr(0, uri.find('/')).find(':') != std::string_view::npos)
     fail(" is an address; only files in the directory of the file are read, so save it there");
-  const std::filesystem::path relative = decode_percents(uri);
-  if (!stays_below(relative)) fail(" is not in the folder of the file or beneath it; move it there");
   const std::filesystem::path folder = std::filesystem::path(builder.file()).parent_path() / ".";
-  const std::filesystem::path path = folder / relative;
   std::error_code error;
+  // Some programs write names as they are, where % is no escape.
+  std::filesystem::path relative = decode_percents(uri);
+  if (!stays_below(relative) || !std::filesystem::is_regular_file(folder / relative, error))
+    if (stays_below(uri) && std::filesystem::is_regular_file(folder / uri, error)) relative = uri;
+  if (!stays_below(relative)) fail(" is not in the folder of the file or beneath it; move it there");
+  const std::filesystem::path path = folder / relative;
   if (!std::filesystem::is_regular_file(path, error))
     fail(" does not exist: the two files belong into one folder");
   const std::filesystem::path root = std::filesystem::canonical(folder, error);

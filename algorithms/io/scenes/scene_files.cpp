@@ -31,6 +31,7 @@ void PartPlacer::place(const ScenePart& part, const Placement& placement) {
   for (const Eigen::Vector3d& point : part.points) builder_.mesh.points.push_back(placement(point));
   std::size_t done = 0;
   for (const auto& [a, b, c] : part.triangles) {
+    if (a == ScenePart::kLeftOut) continue;
     builder_.tick(++done, part.triangles.size());
     std::array<std::int64_t, 3> corners = {first + a, first + b, first + c};
     if (determinant < 0.0) std::swap(corners[1], corners[2]);

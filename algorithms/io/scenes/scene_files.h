@@ -26,6 +26,8 @@ bool begins_like_glb(std::string_view bytes);
 
 /// Reads the objects that the build of a 3MF file lists, with components, including those that the production
 /// extension stores in separate files. A unit other than the millimetre is noted, and changes no number.
+/// Support objects, items that are not to be printed, beam lattices, and parts that a slicer marks as
+/// negative or as modifiers are left out, with notes.
 /// @throws Error for a damaged file, or one that requires an extension that changes its shape.
 void read_three_mf(std::string_view bytes, MeshBuilder& builder);
 
@@ -61,7 +63,8 @@ struct Placement {
 /// Triangles over points of their own, in the coordinates of the part.
 struct ScenePart {
   std::vector<Eigen::Vector3d> points;
-  std::vector<Triangle> triangles;  ///< every corner is a point of the part
+  static constexpr std::uint32_t kLeftOut = 0xffffffffu;  ///< corner of triangles that are not placed
+  std::vector<Triangle> triangles;                        ///< every other corner is a point of the part
 
   /// Returns the bytes that one more copy of the part takes in a mesh.
   double cost() const {

@@ -345,5 +345,63 @@ TEST_F(ThreeMfFileTest, TrianglesWithACornerTwiceAreLeftOutWithANote) {
   EXPECT_EQ(read_mesh(folder / "a.3mf", context).triangles, (Triangles{{0, 1, 2}, {0, 1, 2}}));
 }
 
+TEST_F(ThreeMfFileTest, LeavesOutWhatIsNoPartOfTheModelWithNotes) {
+  const auto count = [&](const std::string& model, std::size_t notes) {
+    context.notes.clear();
+    const std::size_t triangles = read(model).triangles.size();
+    EXPECT_EQ(context.notes.size(), notes);
+    return triangles;
+  };
+  const std::string both = "<item objectid=\"1\"/><item objectid=\"2\"/>";
+  for (const char* type : {"support", "solidsupport", "other"})
+    EXPECT_EQ(count(model_of(object_of(1, kTriangle) + "<object id=\"2\" type=\"" + type + "\">" + kTriangle +
+                                 "</object>",
+                             both),
+                    1),
+              1u);
+  EXPECT_EQ(count(model_of(object_of(1, kTriangle) + object_of(2, kTriangle),
+                           "<item objectid=\"1\"/><item objectid=\"2\" printable=\"0\"/>"),
+                  1),
+            1u);
+  const std::string lattice =
+      "<mesh><vertices><vertex x=\"0\" y=\"0\" z=\"0\"/></vertices><triangles/>"
+      "<b:beamlattice xmlns:b=\"http://b\"/></mesh>";
+  EXPECT_EQ(count(model_of(object_of(1, kTriangle) + object_of(2, lattice), both), 1), 1u);
+  expect_error(model_of(object_of(1, lattice), "<item objectid=\"1\"/>"), "beam");
+}
+
+TEST_F(ThreeMfFileTest, LeavesOutNegativePartsOfSlicers) {
+  const std::string two =
+      "<mesh><vertices><vertex x=\"0\" y=\"0\" z=\"0\"/><vertex x=\"1\" y=\"0\" z=\"0\"/><vertex x=\"0\" "
+      "y=\"2\" z=\"0\"/></vertices><triangles><triangle v1=\"0\" v2=\"1\" v3=\"2\"/>"
+      "<triangle v1=\"0\" v2=\"2\" v3=\"1\"/></triangles></mesh>";
+  const auto with = [&](const std::string& model, const char* name, const std::string& settings) {
+    context.notes.clear();
+    return MeshFileTest::read("a.3mf", zip_of({{"_rels/.rels", kRelationshipsForTests},
+                                               {"3D/3dmodel.model", model},
+                                               {name, "<config>" + settings + "</config>"}}));
+  };
+  const auto volume = [](int triangle, const char* type) {
+    const std::string id = std::to_string(triangle);
+    return "<volume firstid=\"" + id + "\" lastid=\"" + id +
+           "\"><metadata type=\"volume\" key=\"volume_type\" value=\"" + type + "\"/></volume>";
+  };
+  const std::string one_object = model_of(object_of(1, two), "<item objectid=\"1\"/>");
+  const MeshFile prusa =
+      with(one_object, "Metadata/Slic3r_PE_model.config",
+           "<object id=\"1\">" + volume(0, "NegativeVolume") + volume(1, "ModelPart") + "</object>");
+  EXPECT_EQ(prusa.triangles, (Triangles{{0, 2, 1}}));
+  EXPECT_EQ(context.notes.size(), 1u);
+  const std::string assembly =
+      "<components><component objectid=\"1\"/><component objectid=\"2\"/></components>";
+  const MeshFile bambu = with(model_of(object_of(1, kTriangle) + object_of(2, two) + object_of(3, assembly),
+                                       "<item objectid=\"3\"/>"),
+                              "Metadata/model_settings.config",
+                              "<object id=\"3\"><part id=\"1\" subtype=\"normal_part\"/>"
+                              "<part id=\"2\" subtype=\"modifier_part\"/></object>");
+  EXPECT_EQ(bambu.triangles.size(), 1u);
+  EXPECT_EQ(context.notes.size(), 1u);
+}
+
 }  // namespace three_mf_file_test
 }  // namespace hermesh

@@ -239,6 +239,7 @@ struct Component {
 
 struct SceneObject {
   ScenePart part;
+  bool is_printed = true;  ///< false for support and other objects that are no part of the model
   std::vector<Component> components;
   double cost = -1.0;  ///< of the object with all its components; negative until it is known
   int height = 0;      ///< levels of components beneath it
@@ -254,11 +255,14 @@ class ThreeMfReader {
   void read() {
     const std::string root = root_model();
     read_model(root, true);
+    for (const char* settings : {"Metadata/Slic3r_PE_model.config", "Metadata/model_settings.config"})
+      if (archive_.has(settings)) leave_out_by(settings, root);
     if (items_.empty()) builder_.fail("its build places no object, so there is nothing to read");
     // The memory of all copies is checked before the first one is made.
     for (const Component& item : items_) placer_.spend(cost_of(item.object, 0));
     for (const Component& item : items_) place(item, Placement());
     placer_.note_left_out();
+    note_left_out();
     if (by_hermesh_ && items_.size() == 1 && items_[0].is_placed)
       builder_.mesh.origin = items_[0].placement.translation;
   }
@@ -313,7 +317,11 @@ class ThreeMfReader {
       xml.for_text([this](std::string_view text) { by_hermesh_ = trimmed(text) == "hermesh"; });
     else if (root && xml.is("build"))
       xml.for_each_child([&] {
-        if (xml.is("item")) items_.push_back(read_component(xml, model));
+        if (!xml.is("item")) return;
+        if (xml.attribute("printable") == "0")
+          ++not_printed_;
+        else
+          items_.push_back(read_component(xml, model));
       });
   }
 
@@ -339,6 +347,8 @@ class ThreeMfReader {
       xml.fail("the second object with the id ", key.second, "; the file is damaged");
     // References to entries of a map stay valid while other objects are added.
     SceneObject& object = objects_[key];
+    const std::string_view type = xml.attribute("type").value_or("model");
+    object.is_printed = type == "model" || type == "surface";
     xml.for_each_child([&] {
       if (xml.is("mesh")) read_mesh(xml, object.part);
       if (xml.is("components"))
@@ -368,7 +378,8 @@ class ThreeMfReader {
         part.triangles.push_back(
             {corner(xml, "v1", numbers), corner(xml, "v2", numbers), corner(xml, "v3", numbers)});
     };
-    xml.for_each_child([&xml, add_point, add_triangle] {
+    xml.for_each_child([this, &xml, add_point, add_triangle] {
+      lattices_ += xml.name() == "beamlattice";
       if (xml.is("vertices")) xml.for_each_child(add_point);
       if (xml.is("triangles")) xml.for_each_child(add_triangle);
     });
@@ -382,6 +393,61 @@ class ThreeMfReader {
     const std::optional<std::string_view> transform = xml.attribute("transform");
     if (transform) result.placement = placement_of(xml, *transform), result.is_placed = true;
     return result;
+  }
+
+  /// Leaves out the parts that the settings of PrusaSlicer or of Bambu Studio mark as negative, as modifiers
+  /// or as support. The former name triangles of an object, the latter components.
+  void leave_out_by(const char* settings, const std::string& root) {
+    XmlReader xml(archive_, settings, settings, builder_);
+    struct Part {
+      SceneObject* object = nullptr;
+      std::uint32_t first = 0, last = 0;
+    } part;
+    const auto count = [this](std::string_view type) {
+      const bool is_negative = type == "NegativeVolume" || type == "negative_part";
+      ++(is_negative ? negative_ : modifiers_);
+    };
+    const auto read_type = [&] {
+      if (xml.attribute("key") != "volume_type" || xml.attribute("value") == "ModelPart") return;
+      count(xml.attribute("value").value_or(""));
+      std::vector<Triangle>& triangles = part.object->part.triangles;
+      // They stay in their positions, because other parts are numbered, too; placing skips them.
+      for (std::size_t t = part.first; t <= part.last && t < triangles.size(); ++t)
+        triangles[t].fill(ScenePart::kLeftOut);
+    };
+    const auto read_part = [&] {
+      if (!part.object) return;
+      if (xml.name() == "volume") {
+        part.first = whole_number(xml, "firstid"), part.last = whole_number(xml, "lastid");
+        xml.for_each_child(read_type);
+      }
+      const std::string_view type = xml.attribute("subtype").value_or("normal_part");
+      if (xml.name() != "part" || type == "normal_part") return;
+      const std::uint32_t id = whole_number(xml, "id");
+      if (std::erase_if(part.object->components, [&](const Component& c) { return c.object.second == id; }))
+        count(type);
+    };
+    xml.read([&] {
+      xml.for_each_child([&] {
+        if (xml.name() != "object") return;
+        const auto found = objects_.find({root, whole_number(xml, "id")});
+        part.object = found == objects_.end() ? nullptr : &found->second;
+        xml.for_each_child(read_part);
+      });
+    });
+  }
+
+  void note_left_out() {
+    if (not_printed_ > 0)
+      builder_.note("objects left out because they are support or not to be printed: ", not_printed_);
+    if (negative_ > 0)
+      builder_.note("parts left out that a slicer subtracts, as combine can: ", negative_);
+    if (modifiers_ > 0)
+      builder_.note("parts left out that only change a slicer's settings: ", modifiers_);
+    if (lattices_ == 0) return;
+    if (builder_.mesh.triangle_count() == 0)
+      builder_.fail("it consists of beam lattices, which are not read; export it as triangles");
+    builder_.note("beam lattices left out, because they are not read: ", lattices_);
   }
 
   /// Returns the name of a model without a leading slash.
@@ -476,6 +542,7 @@ class ThreeMfReader {
   /// Adds a copy of an object with all its components. The recursion is no deeper than cost_of() allows.
   void place(const Component& component, const Placement& outer) {
     const SceneObject& whole = object(component.object);
+    if (!whole.is_printed) return void(++not_printed_);
     const Placement placement = outer * component.placement;
     placer_.place(whole.part, placement);
     for (const Component& inner : whole.components) place(inner, placement);
@@ -489,6 +556,9 @@ class ThreeMfReader {
   std::vector<Component> items_;
   std::string path_attribute_;
   bool by_hermesh_ = false;
+  // Numbers of what was left out: objects, or placements of them, and parts that a slicer subtracts or uses
+  // to change settings.
+  std::size_t not_printed_ = 0, lattices_ = 0, negative_ = 0, modifiers_ = 0;
 };
 
 }  // namespace
