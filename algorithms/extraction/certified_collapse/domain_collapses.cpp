@@ -28,7 +28,7 @@ DomainMesh::DomainMesh(const DecimatedMesh& mesh, const Domain& domain,
         vertices.push_back({.point = mesh.points[point],
                             .global = point,
                             .here = here,
-                            .free = here && !mesh.input.pinned[point]});
+                            .free = here && !mesh.input.pinned[mesh.leaders[point]]});
       }
       face.corners[i] = v;
       face.own = face.own && vertices[v].here;
@@ -381,8 +381,8 @@ class DomainCollapses {
     ++staying.version;
     going.gone = true;
     local_.merge_corners(collapse_.going, collapse_.v);
-    joins_.push_back({.going = going.global,
-                      .node = {.first = staying.global,
+    joins_.push_back({.going = mesh_.leaders[going.global],
+                      .node = {.first = mesh_.leaders[staying.global],
                                .merges = true,
                                .place = collapse_.x,
                                .quadric = mesh_.quadrics[staying.global]}});
