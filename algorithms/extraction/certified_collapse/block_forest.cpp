@@ -211,6 +211,7 @@ MergeForest block_forest(const DecimationInput& input, const RunContext& context
     if (i == 0 || keys[i].first != keys[i - 1].first) first.push_back(i);
   }
   first.push_back(static_cast<std::uint32_t>(points.size()));
+  std::vector<std::pair<std::uint64_t, std::uint32_t>>().swap(keys);
 
   // Blocks share no vertices, and edges between them do not count, so blocks are independent.
   std::vector<std::uint32_t> node_of(points.size(), MergeForest::kNone);

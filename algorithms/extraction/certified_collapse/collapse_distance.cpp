@@ -23,8 +23,8 @@ bool CollapseDistance::attach_samples() {
   reach_.clear();
   for (const Collapse::NewFace& made : collapse_.made) reach_.emplace_back(made.at);
   const auto attach_own = [&](std::uint32_t vertex) {
-    const std::uint32_t sample = domain_.vertices[vertex].global;
-    return !mesh_.unmoved[sample] || attach(sample);
+    const std::uint32_t global = domain_.vertices[vertex].global;
+    return !mesh_.unmoved[global] || attach(mesh_.leaders[global]);
   };
   if (collapse_.v_moves && !attach_own(collapse_.v)) return false;
   if (!attach_own(collapse_.going)) return false;

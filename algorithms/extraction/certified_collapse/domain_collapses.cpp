@@ -28,7 +28,7 @@ DomainMesh::DomainMesh(const DecimatedMesh& mesh, const Domain& domain,
         vertices.push_back({.point = mesh.points[point],
                             .global = point,
                             .here = here,
-                            .free = here && !mesh.input.pinned[point]});
+                            .free = here && !mesh.input.pinned[mesh.leaders[point]]});
       }
       face.corners[i] = v;
       face.own = face.own && vertices[v].here;
@@ -101,8 +101,12 @@ class DomainCollapses {
         local_(mesh, domain, triangles, local),
         distance_(mesh, local_, collapse_) {
     // Collapses prevented by the domain's border are possible in the next round, which has other borders.
-    for (std::uint32_t v = 0; v < local_.vertices.size(); ++v)
-      if (at(v).here && !at(v).free) mark_dirty(v);
+    // Of other edges there, those that this round would not test either have failed before.
+    for (const DomainMesh::Face& face : local_.faces) {
+      if (!is_dirty(face.corners[0]) && !is_dirty(face.corners[1]) && !is_dirty(face.corners[2])) continue;
+      for (const std::uint32_t v : face.corners)
+        if (at(v).here && !at(v).free) mark_dirty(v);
+    }
   }
 
   std::vector<Join> run(const RunContext& context) {
@@ -112,7 +116,7 @@ class DomainCollapses {
         const std::uint32_t u = face.corners[i], v = face.corners[(i + 1) % 3];
         // Each edge between two own faces once. An edge at the border of these may be omitted: both its ends
         // have a face that is not the domain's, and neither may move.
-        if (u < v && (mesh_.dirty[at(u).global] || mesh_.dirty[at(v).global])) propose(u, v);
+        if (u < v && (is_dirty(u) || is_dirty(v))) propose(u, v);
       }
     }
     for (std::size_t step = 0; !heap_.empty(); ++step) {
@@ -144,6 +148,8 @@ class DomainCollapses {
   };
 
   const DomainMesh::Vertex& at(std::uint32_t v) const { return local_.vertices[v]; }
+  /// Returns true if the edges at a vertex are tested in this round.
+  bool is_dirty(std::uint32_t v) const { return mesh_.dirty[at(v).global] != 0; }
   /// Schedules the edges at a vertex for the next round.
   void mark_dirty(std::uint32_t v) { mesh_.dirty_next[at(v).global] = 1; }
 
@@ -381,8 +387,8 @@ class DomainCollapses {
     ++staying.version;
     going.gone = true;
     local_.merge_corners(collapse_.going, collapse_.v);
-    joins_.push_back({.going = going.global,
-                      .node = {.first = staying.global,
+    joins_.push_back({.going = mesh_.leaders[going.global],
+                      .node = {.first = mesh_.leaders[staying.global],
                                .merges = true,
                                .place = collapse_.x,
                                .quadric = mesh_.quadrics[staying.global]}});
@@ -404,6 +410,11 @@ class DomainCollapses {
 std::vector<Join> collapse_in_domain(DecimatedMesh& mesh, Collapses kind, const Domain& domain,
                                      std::span<const std::uint32_t> triangles,
                                      std::vector<std::uint32_t>& local, const RunContext& context) {
+  // Without an edge to test, a domain is left as it is.
+  if (std::ranges::none_of(triangles, [&](std::uint32_t t) {
+        return std::ranges::any_of(mesh.triangles[t], [&](std::uint32_t p) { return mesh.dirty[p] != 0; });
+      }))
+    return {};
   return DomainCollapses(mesh, kind, domain, triangles, local).run(context);
 }
 

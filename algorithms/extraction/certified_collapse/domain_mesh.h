@@ -14,25 +14,29 @@
 
 namespace hermesh {
 
-/// A mesh whose edges collapse. Its vertices are some of those of the fine mesh, the *samples*, and have
-/// their indices. FineMesh::kNone stands for no triangle, no sample or no vertex.
+/// A mesh whose edges collapse. The vertices of the fine mesh are its *samples*; its own vertices have the
+/// indices of the merged mesh that it began with, of which there are far fewer. FineMesh::kNone stands for no
+/// triangle, no sample or no vertex.
 struct DecimatedMesh {
-  explicit DecimatedMesh(const DecimationInput& in) : input(in) {}
+  DecimatedMesh(const DecimationInput& in, std::span<const std::uint32_t> sample_of_vertex)
+      : input(in), leaders(sample_of_vertex) {}
 
   const DecimationInput& input;
-  // By sample; `points`, `quadrics` and `least_tolerance` are set only for samples that are vertices.
-  std::vector<Eigen::Vector3d> points;  ///< current positions; FilePoints::rounded()
-  std::vector<PlaneQuadric> quadrics;   ///< planes that the vertex represents, about the vertex
-  std::vector<float> least_tolerance;   ///< least among the samples that the vertex represents
-  std::vector<std::uint8_t> unmoved;    ///< 1 for samples that are vertices in their original position
+  // By vertex:
+  std::span<const std::uint32_t> leaders;  ///< the sample that represents each, as MergeForest::leader()
+  std::vector<Eigen::Vector3d> points;     ///< current positions; FilePoints::rounded()
+  std::vector<PlaneQuadric> quadrics;      ///< planes that the vertex represents, about the vertex
+  std::vector<float> least_tolerance;      ///< least among the samples that the vertex represents
+  std::vector<std::uint8_t> unmoved;       ///< 1 for vertices that are at their sample
+  /// 1 if edges at the vertex are tested in this round, and in the next. An edge that failed fails again,
+  /// unless something near it has changed or the border of a domain prevented it.
+  std::vector<std::uint8_t> dirty, dirty_next;
   // By triangle, except `next_sample`:
   std::vector<Triangle> triangles;           ///< removed if the first corner is kNone
   std::vector<std::uint32_t> fine_triangle;  ///< triangle of the fine mesh that each originates from
   std::vector<std::uint32_t> first_sample;   ///< head of the list of samples attached to each, or kNone
-  std::vector<std::uint32_t> next_sample;    ///< by sample: the next one of the same list, or kNone
-  /// By sample, 1 if edges at the vertex are tested in this round, and in the next. An edge that failed fails
-  /// again, unless something near it has changed or the border of a domain prevented it.
-  std::vector<std::uint8_t> dirty, dirty_next;
+  /// By sample: the next one of the same list, or kNone. Empty for unverified collapses, which use no samples
+  std::vector<std::uint32_t> next_sample;
 
   bool alive(std::size_t triangle) const { return triangles[triangle][0] != FineMesh::kNone; }
 };
@@ -63,7 +67,7 @@ struct DomainMesh {
 
   struct Vertex {
     Eigen::Vector3d point;
-    std::uint32_t global;
+    std::uint32_t global;  ///< index in the decimated mesh
     std::uint32_t first_corner = kNone;
     std::uint32_t version = 0;  ///< incremented when the vertex changes
     bool here = false;          ///< in the domain, so that all its triangles are known

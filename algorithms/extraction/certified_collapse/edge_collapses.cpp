@@ -118,10 +118,10 @@ void erase_dead(DecimatedMesh& mesh) {
 /// Attaches every sample to a triangle near it, except those that are unmoved vertices.
 void attach_samples(DecimatedMesh& mesh, const MergeForest& forest, const MergedMesh& merged,
                     const RunContext& context) {
-  std::vector<std::uint32_t> nearest(mesh.unmoved.size(), FineMesh::kNone);
+  std::vector<std::uint32_t> nearest(mesh.input.fine.points().size(), FineMesh::kNone);
   parallel_blocks(nearest.size(), context, [&](std::size_t i) {
     const auto sample = static_cast<std::uint32_t>(i);
-    if (mesh.unmoved[sample]) return;
+    if (forest.set_of(sample) == MergeForest::kNone) return;
     // A component merged into two vertices has no triangle left; the proof restores it.
     const std::uint32_t point = merged.number[forest.leader(sample)];
     if (point == MergeForest::kNone) return;
@@ -136,6 +136,7 @@ void attach_samples(DecimatedMesh& mesh, const MergeForest& forest, const Merged
     double squared;
     nearest[i] = merged.mesh->nearest_around(nearest[i], p, squared);
   });
+  mesh.next_sample.assign(nearest.size(), FineMesh::kNone);
   // In one thread, ascending: the lists are the same for any number of threads.
   for (std::uint32_t sample = 0; sample < nearest.size(); ++sample) {
     if (nearest[sample] == FineMesh::kNone) continue;
@@ -144,12 +145,12 @@ void attach_samples(DecimatedMesh& mesh, const MergeForest& forest, const Merged
   }
 }
 
-/// Returns the merged mesh with the indices of the fine one, and with the planes and tolerances of all that
-/// its vertices represent. Edges at the vertices `where` are tested in the first round.
+/// Returns the merged mesh with the planes and tolerances of all that its vertices represent. Edges at the
+/// vertices `where` are tested in the first round.
 DecimatedMesh begin(const MergeForest& forest, const MergedMesh& merged, std::span<const std::uint8_t> where,
                     const DecimationInput& input, const RunContext& context) {
-  const std::size_t n = input.fine.points().size();
-  DecimatedMesh mesh(input);
+  const std::size_t n = merged.leaders.size();
+  DecimatedMesh mesh(input, merged.leaders);
   mesh.points.resize(n);
   mesh.quadrics.resize(n);
   mesh.least_tolerance.resize(n);
@@ -158,26 +159,21 @@ DecimatedMesh begin(const MergeForest& forest, const MergedMesh& merged, std::sp
   mesh.dirty_next.resize(n);
   mesh.fine_triangle = merged.origin;
   mesh.first_sample.assign(merged.origin.size(), FineMesh::kNone);
-  mesh.next_sample.assign(n, FineMesh::kNone);
   parallel_blocks(n, context, [&](std::size_t i) {
-    mesh.unmoved[i] = forest.set_of(static_cast<std::uint32_t>(i)) == MergeForest::kNone;
-  });
-  parallel_blocks(merged.leaders.size(), context, [&](std::size_t i) {
     const std::uint32_t p = merged.leaders[i], set = forest.set_of(p);
-    mesh.dirty[p] = where.empty() || where[p];
-    mesh.points[p] = merged.mesh->points()[i];
-    mesh.least_tolerance[p] = input.tolerance[p];
+    mesh.unmoved[i] = set == MergeForest::kNone;
+    mesh.dirty[i] = where.empty() || where[p];
+    mesh.points[i] = merged.mesh->points()[i];
+    mesh.least_tolerance[i] = input.tolerance[p];
     if (set == MergeForest::kNone) {
-      mesh.quadrics[p] = quadric_at(input.fine, p);
+      mesh.quadrics[i] = quadric_at(input.fine, p);
       return;
     }
-    mesh.quadrics[p] = forest.node(set).quadric;
+    mesh.quadrics[i] = forest.node(set).quadric;
     for (const std::uint32_t sample : forest.members(set))
-      mesh.least_tolerance[p] = std::min(mesh.least_tolerance[p], input.tolerance[sample]);
+      mesh.least_tolerance[i] = std::min(mesh.least_tolerance[i], input.tolerance[sample]);
   });
   mesh.triangles = merged.mesh->triangles();
-  for (Triangle& t : mesh.triangles)
-    for (std::uint32_t& p : t) p = merged.leaders[p];
   return mesh;
 }
 

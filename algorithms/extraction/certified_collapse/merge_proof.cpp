@@ -78,6 +78,7 @@ void MergeProof::take_in_joins() {
     proofs_[t] = (proofs_[t] & (kCovered | kFar | kOpen)) | (stays(t) ? kStays : 0);
   });
   std::erase_if(merged_.origin, [&](std::uint32_t t) { return !(proofs_[t] & kStays); });
+  merged_.origin.shrink_to_fit();  // of the first call, which begins with all triangles
   build();
   if (!any_covered_) return;
   std::vector<std::uint32_t> changed;
@@ -104,15 +105,15 @@ bool MergeProof::is_single(std::uint32_t t) const {
 /// Builds the merged mesh. Its vertices are in the order of the fine ones that represent them.
 void MergeProof::build() {
   merged_.number.assign(fine_.points().size(), MergeForest::kNone);
-  const auto for_each_corner = [&](auto&& f) {
-    parallel_blocks(merged_.origin.size(), context_, [&](std::size_t i) {
-      const Triangle& fine = fine_.triangles()[merged_.origin[i]];
-      for (int corner = 0; corner < 3; ++corner) f(i, corner, forest_.leader(fine[corner]));
-    });
-  };
-  for_each_corner([&](std::size_t, int, std::uint32_t leader) {
-    // Several triangles share a leader, and all write the same value.
-    std::atomic_ref(merged_.number[leader]).store(0, std::memory_order_relaxed);
+  merged_.mesh.reset();
+  std::vector<Triangle> triangles(merged_.origin.size());  // of leaders first
+  parallel_blocks(triangles.size(), context_, [&](std::size_t i) {
+    const Triangle& fine = fine_.triangles()[merged_.origin[i]];
+    for (int corner = 0; corner < 3; ++corner) {
+      const std::uint32_t leader = triangles[i][corner] = forest_.leader(fine[corner]);
+      // Several triangles share a leader, and all write the same value.
+      std::atomic_ref(merged_.number[leader]).store(0, std::memory_order_relaxed);
+    }
   });
   merged_.leaders.clear();
   for (std::uint32_t p = 0; p < merged_.number.size(); ++p) {
@@ -125,9 +126,8 @@ void MergeProof::build() {
     const std::uint32_t set = forest_.set_of(merged_.leaders[i]);
     points[i] = set == MergeForest::kNone ? fine_.points()[merged_.leaders[i]] : forest_.node(set).place;
   });
-  std::vector<Triangle> triangles(merged_.origin.size());
-  for_each_corner([&](std::size_t i, int corner, std::uint32_t leader) {
-    triangles[i][corner] = merged_.number[leader];
+  parallel_blocks(triangles.size(), context_, [&](std::size_t i) {
+    for (std::uint32_t& p : triangles[i]) p = merged_.number[p];
   });
   merged_.mesh.emplace(std::move(points), std::move(triangles));
 }
