@@ -208,11 +208,15 @@ const OptionTable<AskedTolerance>& tolerance_table() {
 
 std::vector<OptionSpec> tolerance_options() { return tolerance_table().specs(); }
 
+double asked_tolerance(const Options& options, const IndexToWorld& placement) {
+  const AskedTolerance asked = tolerance_table().read(options);
+  return asked.world > 0 ? asked.world / longest_step(placement) : asked.voxels;
+}
+
 PolygonMesh contour_certified(const ExtractionInput& input, std::string_view name, bool needs_normals,
                               const std::function<PolygonMesh(const HermiteView&, double)>& contour) {
-  const AskedTolerance asked = tolerance_table().read(input.options);
   const auto contoured = [&](const HermiteView& grid) {
-    return contour(grid, asked.world > 0 ? asked.world / longest_step(grid.placement()) : asked.voxels);
+    return contour(grid, asked_tolerance(input.options, grid.placement()));
   };
   // Packed data are decoded on access, by code compiled for their normal code; all other representations are
   // floats by now.

@@ -82,6 +82,8 @@ PolygonMesh finished(CertifiedPolygons polygons, const FieldAtPoints& field, con
 
 /// Returns the options `tolerance` and `tolerance_world` of both extractors.
 std::vector<OptionSpec> tolerance_options();
+/// Returns the tolerance in voxels that these options request.
+double asked_tolerance(const Options& options, const IndexToWorld& placement);
 
 /// Calls `contour` with the input's Hermite data and the tolerance of its options in voxels. `name` is the
 /// extractor's, for messages.

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "algorithms/core/parallel.h"
+#include "algorithms/hermite/polygon_parts.h"
 #include "algorithms/hermite/samplers.h"
 #include "algorithms/lattice/block_table.h"
 #include "algorithms/lattice/sample_side.h"
@@ -57,14 +58,17 @@ std::vector<IndexTriangle> to_index_space(const PolygonMesh& mesh, const IndexTo
     for (int c = 0; c < 3; ++c) t.corner[c] = inverse * (mesh.points[triangles[i][c]].cast<double>() + shift);
     t.normal = (t.corner[1] - t.corner[0]).cross(t.corner[2] - t.corner[0]);
   }
-  // Outward normals distinguish an entry from an exit.
-  const double turn = is_inside_out(result) ? -1.0 : 1.0;
-  for (IndexTriangle& t : result) {
+  return result;
+}
+
+/// Makes the normals unit vectors that point outwards, which distinguishes an entry from an exit.
+void direct_normals(std::vector<IndexTriangle>& triangles, bool inside_out) {
+  const double turn = inside_out ? -1.0 : 1.0;
+  for (IndexTriangle& t : triangles) {
     const double length = t.normal.norm();
     // A triangle without an area has a normal of 0 and is hit by no line.
     if (length > 0) t.normal /= turn * length;
   }
-  return result;
 }
 
 /// Distance around a block within which its triangles are gathered, in voxels: a crossing edge that no
@@ -313,8 +317,19 @@ class LeafHits {
 FloatHermite sample_polygons(const LevelSet& level_set, double isovalue, const PolygonMesh& mesh,
                              RunContext& context, PolygonSampling* sampling) {
   FloatHermite result = sample_level_set(level_set, isovalue, context);
+  take_polygons(result, mesh, are_inside_out(mesh, result.placement), context, sampling);
+  return result;
+}
+
+bool are_inside_out(const PolygonMesh& mesh, const IndexToWorld& placement) {
+  return is_inside_out(to_index_space(mesh, placement));
+}
+
+void take_polygons(FloatHermite& result, const PolygonMesh& mesh, bool inside_out, RunContext& context,
+                   PolygonSampling* sampling) {
   Stage stage(context, "Hermite data from the polygons");
-  const std::vector<IndexTriangle> triangles = to_index_space(mesh, result.placement);
+  std::vector<IndexTriangle> triangles = to_index_space(mesh, result.placement);
+  direct_normals(triangles, inside_out);
   const TriangleBins bins = bin_triangles(triangles, result, context);
   std::vector<PolygonSampling> counts(result.leaves.size());
   parallel_blocks(result.leaves.size(), context, [&](std::size_t b) {
@@ -341,7 +356,6 @@ FloatHermite sample_polygons(const LevelSet& level_set, double isovalue, const P
       sampling->ambiguous += c.ambiguous;
     }
   }
-  return result;
 }
 
 }  // namespace hermesh

@@ -1,5 +1,7 @@
 #include "algorithms/lattice/grid_placement.h"
 
+#include <openvdb/openvdb.h>
+
 #include <algorithm>
 #include <bit>
 #include <cmath>
@@ -7,6 +9,7 @@
 #include "algorithms/core/error.h"
 #include "algorithms/core/level_set_grid.h"
 #include "algorithms/core/polygon_mesh.h"
+#include "algorithms/lattice/part_placement.h"
 
 namespace hermesh {
 namespace {
@@ -33,6 +36,25 @@ void include_active(const Leaf& leaf, openvdb::CoordBBox& box) {
   const auto any_y = static_cast<std::uint8_t>(any_x);
   lowest.z() = std::countr_zero(any_y), highest.z() = 7 - std::countl_zero(any_y);
   box.expand(openvdb::CoordBBox(leaf.origin() + lowest, leaf.origin() + highest));
+}
+
+/// Names of the metadata with the corners of the extent of all parts of a lattice.
+constexpr const char *kExtentLower = "hermesh_extent_lower", *kExtentUpper = "hermesh_extent_upper";
+
+openvdb::FloatGrid::ConstPtr grid_with_extent(const openvdb::FloatGrid& grid, const SampleBox& extent) {
+  openvdb::MetaMap map(grid);
+  const auto corner = [](const Eigen::Vector3i& at) { return openvdb::Vec3i(at[0], at[1], at[2]); };
+  map.insertMeta(kExtentLower, openvdb::Vec3IMetadata(corner(extent.lower)));
+  map.insertMeta(kExtentUpper, openvdb::Vec3IMetadata(corner(extent.upper)));
+  return grid.copyReplacingMetadata(map);
+}
+
+/// Returns the box that determines the placement: the extent if there is one, or the active voxels.
+openvdb::CoordBBox placing_box(const openvdb::FloatGrid& grid) {
+  const auto lower = grid.getMetadata<openvdb::Vec3IMetadata>(kExtentLower),
+             upper = grid.getMetadata<openvdb::Vec3IMetadata>(kExtentUpper);
+  if (!lower || !upper) return active_box(grid.tree());
+  return {Coord(lower->value()), Coord(upper->value()).offsetBy(-1)};
 }
 
 }  // namespace
@@ -67,7 +89,7 @@ IndexToWorld placement_of(const openvdb::FloatGrid& grid) {
     for (int column = 0; column < 3; ++column) result.linear(row, column) = matrix(column, row);
   const Eigen::Vector3d translation(matrix(3, 0), matrix(3, 1), matrix(3, 2));
 
-  const openvdb::CoordBBox box = active_box(grid.tree());
+  const openvdb::CoordBBox box = placing_box(grid);
   Bounds world;
   if (!box.empty()) {
     for (int axis = 0; axis < 3; ++axis) {
@@ -94,6 +116,30 @@ IndexToWorld placement_of(const openvdb::FloatGrid& grid) {
 }
 
 IndexToWorld placement_of(const LevelSet& level_set) { return placement_of(*level_set.grid().grid); }
+
+SampleBox extent_of(const PolygonMesh& mesh, double voxel_size) {
+  SampleBox extent;
+  const Bounds box = bounds(mesh);
+  for (int a = 0; a < 3; ++a) {
+    // Edges that are crossed near the polygons, and the cells at them, are within a block.
+    extent.lower[a] = static_cast<std::int32_t>(std::floor((box.lower[a] - mesh.origin[a]) / voxel_size)) - 8;
+    extent.upper[a] = static_cast<std::int32_t>(std::ceil((box.upper[a] - mesh.origin[a]) / voxel_size)) + 16;
+    extent.lower[a] &= ~7, extent.upper[a] &= ~7;
+  }
+  return extent;
+}
+
+LevelSet with_extent(const LevelSet& level_set, const SampleBox& extent) {
+  return make_level_set(grid_with_extent(*level_set.grid().grid, extent));
+}
+
+LevelSet outline_of(const Eigen::Vector3d& origin, double voxel_size, const SampleBox& extent) {
+  const auto grid = openvdb::FloatGrid::create();
+  grid->setTransform(transform_at(origin, voxel_size));
+  for (const Eigen::Vector3i& at : {extent.lower, Eigen::Vector3i(extent.upper - Eigen::Vector3i::Ones())})
+    grid->tree().setValueOn(Coord(at[0], at[1], at[2]));
+  return with_extent(make_level_set(grid), extent);
+}
 
 std::shared_ptr<openvdb::math::Transform> transform_at(const Eigen::Vector3d& origin, double voxel_size) {
   const auto transform = openvdb::math::Transform::createLinearTransform(voxel_size);

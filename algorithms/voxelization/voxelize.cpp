@@ -9,7 +9,7 @@
 #include "algorithms/lattice/sample_side.h"
 #include "algorithms/voxelization/distance/band.h"
 #include "algorithms/voxelization/distance/wide_band.h"
-#include "algorithms/voxelization/inside/interior_faces.h"
+#include "algorithms/voxelization/inside/boundary_distances.h"
 #include "algorithms/voxelization/inside/signs.h"
 
 namespace hermesh {
@@ -65,16 +65,6 @@ PolygonMesh to_mesh(const std::vector<TriangleCorners>& triangles, double voxel_
   return mesh;
 }
 
-/// Lowers the leaf's distances to `values`, and activates the voxels in `active`. Inactive voxels have the
-/// reach, which is never less than an active voxel's distance.
-void lower(FloatLeaf& leaf, const float* values, const std::uint64_t* active) {
-  float* own = leaf.buffer().data();
-  for (unsigned i = 0; i < 512; ++i) own[i] = std::min(own[i], values[i]);
-  FloatLeaf::NodeMaskType mask = leaf.getValueMask();
-  for (openvdb::Index x = 0; x < 8; ++x) mask.getWord<openvdb::Index64>(x) |= active[x];
-  leaf.setValueMask(mask);
-}
-
 /// Adds the distances to the caps of the holes, and the blocks that are near caps only.
 void add_caps(Signs& signs, double voxel_size, double reach, const BlockTable& table, Band& band,
               RunContext& context) {
@@ -90,7 +80,7 @@ void add_caps(Signs& signs, double voxel_size, double reach, const BlockTable& t
     if (known != BlockTable::kNone && band.leaves[known]) {
       FloatLeaf& cap = *near_caps.leaves[i];
       FloatLeaf::NodeMaskType mask = cap.getValueMask();
-      lower(*band.leaves[known], cap.buffer().data(), &mask.getWord<openvdb::Index64>(0));
+      lower_distances(*band.leaves[known], cap.buffer().data(), &mask.getWord<openvdb::Index64>(0));
       continue;
     }
     // A block of the table without a voxel near the mesh exists twice from now on; only the new entry has a
@@ -104,54 +94,6 @@ void add_caps(Signs& signs, double voxel_size, double reach, const BlockTable& t
       band.nearest.back()->fill(-1);
     }
   }
-}
-
-/// Replaces the distances of the leaf's voxels inside by those of `other`. Voxels outside keep theirs: every
-/// path from outside to an interior face crosses the solid's boundary first, so the face is never the
-/// nearest.
-void replace_inside(FloatLeaf& leaf, const FoundLeaf& other, const BlockMask& inside, float reach) {
-  FloatLeaf::NodeMaskType mask = leaf.getValueMask();
-  for_each_bit(inside, [&](int i) {
-    leaf.buffer().data()[i] = other.any ? other.values[i] : reach;
-    mask.set(openvdb::Index32(i), other.any && test(other.active, i));
-  });
-  leaf.setValueMask(mask);
-}
-
-/// Computes the distances of the voxels inside again without the faces that do not bound the solid. Works
-/// leaf by leaf, since all new ones at once could take more memory than a small volume.
-InteriorFaces leave_out_interior_faces(const IndexSoup& soup, TriangleBins& bins, const Signs& signs,
-                                       BandWork work, Band& band, RunContext& context) {
-  InteriorFaces sheets = find_interior_faces(soup, bins, band, signs, work.reach, work.voxel_size, context);
-  if (sheets.triangles.empty()) return sheets;
-  // First without all triangles that are inner, even if only in part. Each callback writes to its own block's
-  // leaf, so that threads need no lock.
-  work.blocks = &sheets.blocks;
-  work.without = &sheets.triangles;
-  find_leaves(soup, bins, work, context, [&](const FoundLeaf& found) {
-    if (!band.leaves[found.block]) return;
-    const BlockMask& inside = signs.inside[found.block];
-    replace_inside(*band.leaves[found.block], found, inside, float(work.reach * work.voxel_size));
-    if (!work.nearest || !found.any) return;
-    for_each_bit(inside, [&](int v) { (*band.nearest[found.block])[v] = found.nearest[v]; });
-  });
-  if (sheets.pieces.triangles.empty()) return sheets;
-  // Then the outer pieces of the cut triangles are added again. They lie within their triangles, so all
-  // blocks within their reach are in `bins`.
-  const IndexSoup pieces(sheets.pieces, work.voxel_size);
-  TriangleBins piece_bins(pieces, work.reach, context);
-  work.blocks = work.without = nullptr;
-  const std::vector<BlockAt> at = piece_bins.blocks().blocks();
-  find_leaves(pieces, piece_bins, work, context, [&](const FoundLeaf& found) {
-    const std::uint32_t block = found.any ? bins.blocks().find(at[found.block]) : BlockTable::kNone;
-    if (block == BlockTable::kNone || !band.leaves[block]) return;
-    if (work.nearest)
-      for (unsigned v = 0; v < 512; ++v)
-        if (found.values[v] < band.leaves[block]->buffer().data()[v])
-          (*band.nearest[block])[v] = std::int32_t(sheets.parents[std::size_t(found.nearest[v])]);
-    lower(*band.leaves[block], found.values, found.active);
-  });
-  return sheets;
 }
 
 /// Returns the grid of the nearest triangles; its active voxels are those of the band's leaves.

@@ -70,6 +70,9 @@ void print_extracted(Session& session, const PolygonMesh& mesh, const std::strin
 /// Adds statistics of thickened parts to the JSON document; they are 0 if no part was thickened.
 void report_thin_parts(const std::optional<ThinParts>& thin, Session& session);
 
+/// Adds the command join.
+void add_join(CLI::App& app, Session& session);
+
 /// Writes the mesh, with the unit of its coordinates if --units is given and the format stores one.
 void write_output(const std::string& path, const PolygonMesh& mesh, Session& session);
 

@@ -15,6 +15,7 @@
 #include "algorithms/io/written_precision.h"
 #include "algorithms/remesh/auto_voxel.h"
 #include "algorithms/remesh/bounded_remesh.h"
+#include "algorithms/remesh/tiled_remesh.h"
 #include "experiments/cli/cli11.h"
 #include "experiments/cli/conversions.h"
 #include "experiments/cli/signals.h"
@@ -22,6 +23,8 @@
 
 namespace hermesh::cli {
 namespace {
+
+constexpr int kDefaultTile = 512;
 
 struct ConvertArguments {
   Paths paths;
@@ -43,6 +46,8 @@ struct ConvertArguments {
   std::optional<double> most_points;
   bool through_volume = false;
   double smallest_voxel = 0.0;  ///< world units; 0: not given
+  int tiles = 0;                ///< side of the tiles in voxels; 0: not given
+  std::string tile;             ///< "I/N", the job; empty: not given
 };
 
 // ---- Adaptivity.
@@ -261,23 +266,102 @@ void choose_voxel_size(const PolygonMesh& mesh, VoxelizeArguments& voxelizing, S
         " would leave " + percent(limits.share) + " (--voxel-size)");
 }
 
-int run_remesh(ConvertArguments& arguments, Session& session) {
+// ---- Remeshing by tiles.
+
+/// Sets the options that --tiles and --tile imply, and returns the job. @throws UsageError for options that
+/// contradict them
+TileJob choose_tiles(ConvertArguments& arguments, const CLI::App& command) {
+  refuse_idle(command,
+              {"--mask", "--frustum", "--frustum-resolution", "--outside", "--tolerance-grid", "--isovalue",
+               "--exterior-band", "--interior-band"},
+              "it cannot be combined with --tiles and --tile");
+  VoxelizeArguments& voxelizing = arguments.voxelizing;
+  if (voxelizing.signs.value_or("winding-number") != "winding-number")
+    throw UsageError(
+        "--signs " + *voxelizing.signs +
+        " needs the whole volume, which --tiles avoids; omit it, since tiles use winding-number");
+  if (voxelizing.thin.value_or("drop") != "drop")
+    throw UsageError("--thin " + *voxelizing.thin +
+                     " needs the whole volume, which --tiles avoids; use --thin drop or smaller voxels");
+  voxelizing.signs = "winding-number";
+  voxelizing.thin = "drop";
+  if (arguments.tiles == 0) arguments.tiles = kDefaultTile;
+  arguments.extracting.options.push_back("tile=" + std::to_string(arguments.tiles));
+  TileJob job;
+  if (arguments.tile.empty()) return job;
+  const char *at = arguments.tile.data(), *end = at + arguments.tile.size();
+  const auto [slash, first] = std::from_chars(at, end, job.number);
+  const auto [last, second] = slash != end && *slash == '/' ? std::from_chars(slash + 1, end, job.count)
+                                                            : std::from_chars_result{at, std::errc()};
+  if (first != std::errc() || second != std::errc() || last != end || job.number < 1 ||
+      job.count < job.number || job.count > 1'000'000)
+    throw UsageError("--tile must be the number of a job and that of all jobs, such as 1/4, not '" +
+                     arguments.tile + "'");
+  return job;
+}
+
+/// Remeshes tile by tile, as remesh() does, or writes the tiles of a job and returns nothing.
+std::optional<Remeshed> remesh_by_tiles(const ConvertArguments& arguments, const PolygonMesh& mesh,
+                                        const VoxelizeRecipe& recipe, const TileJob& job, Session& session) {
+  const std::string &in = arguments.paths.in, &out = arguments.paths.out;
+  Remeshed remeshed;
+  remeshed.voxel_size = voxel_size_of(recipe, mesh);
+  Stopwatch watch;
+  TilePart part = about_file(in, [&] {
+    return remesh_tiles(mesh, recipe, extract_recipe(arguments, std::nullopt), job, session.context);
+  });
+  part.in_metres = !session.units.empty();
+  remeshed.seconds = watch.seconds();
+  made(session, "polygons", mesh.triangle_count());
+  made(session, "voxel_size", remeshed.voxel_size);
+  made(session, "tiles", part.tiles.size());
+  print_summary(session, "remeshed " + in + ": " + std::to_string(mesh.triangle_count()) + " triangles, " +
+                             std::to_string(part.tiles.size()) + " tiles of " +
+                             std::to_string(arguments.tiles) + " voxels of " + text(remeshed.voxel_size) +
+                             ", " + seconds_text(remeshed.seconds));
+  session.context.note("walls, wires and gaps that are thinner than the voxels are lost with tiles");
+  if (!arguments.tile.empty()) {
+    write_tile_part(out, part);
+    return std::nullopt;
+  }
+  std::vector<TilePart> parts;
+  parts.push_back(std::move(part));
+  remeshed.mesh = about_file(in, [&] { return join_parts(std::move(parts)); });
+  remeshed.extract_seconds = watch.seconds();
+  note_components(mesh, remeshed.mesh, session.context);
+  return remeshed;
+}
+
+int run_remesh(ConvertArguments& arguments, const CLI::App& command, Session& session) {
   VoxelizeArguments& voxelizing = arguments.voxelizing;
   const Paths& paths = arguments.paths;
+  // The default limit holds for losses that the user requested.
+  const bool requested = voxelizing.thin.has_value();
+  std::optional<TileJob> job;
+  if (arguments.tiles > 0 || !arguments.tile.empty()) job = choose_tiles(arguments, command);
   voxelizing.choose();
   arguments.extracting.choose();
-  check_mesh_output(paths.out);
+  if (arguments.tile.empty())
+    check_mesh_output(paths.out);
+  else
+    check_writable(paths.out);
   const ThinRule rule = voxelizing.thin_rule(arguments.isovalue);
-  // The default limit holds for losses that the user requested.
-  const double max_loss = most_loss(arguments.max_loss, voxelizing.thin ? rule : ThinRule::keep);
+  const double max_loss = most_loss(arguments.max_loss, requested ? rule : ThinRule::keep);
   const std::optional<AdaptivityField> field = read_adaptivity(arguments, session);
   const PolygonMesh mesh = read_polygons(paths.in, session);
   if (!voxelizing.voxel_size && voxelizing.resolution.value_or(0) == 0)
     choose_voxel_size(mesh, voxelizing, session);
   const VoxelizeRecipe recipe = voxelizing.recipe(mesh, paths.in, arguments.isovalue);
-  const Remeshed made = about_file(
-      paths.in, [&] { return remesh(mesh, recipe, extract_recipe(arguments, field), session.context); });
-  print_voxelized(session, paths.in, mesh, made, voxelizing.chosen.voxelizer.name);
+  const std::optional<Remeshed> result =
+      job ? remesh_by_tiles(arguments, mesh, recipe, *job, session) : about_file(paths.in, [&] {
+        return std::optional(remesh(mesh, recipe, extract_recipe(arguments, field), session.context));
+      });
+  if (!result) {
+    work_is_finished();
+    return kDone;
+  }
+  const Remeshed& made = *result;
+  if (!job) print_voxelized(session, paths.in, mesh, made, voxelizing.chosen.voxelizer.name);
   if (rule != ThinRule::drop) report_thin_parts(made.thin, session);
   print_extracted(session, made.mesh, arguments.extracting.chosen.extractor.name, made.extract_seconds);
   // Other isovalues, and parts outside a mask, do not show the polygons by intention.
@@ -336,9 +420,9 @@ void report_exceptions(const BoundedMesh& bounded, Session& session) {
 
 int run_bounded(const ConvertArguments& arguments, const CLI::App& command, Session& session) {
   refuse_idle(command,
-              {"--extractor", "-o", "--voxelizer", "--voxelizer-option", "--exterior-band", "--interior-band",
-               "--isovalue", "--max-loss", "--mask", "--frustum", "--frustum-resolution", "--outside",
-               "--tolerance-grid"},
+              {"--tiles", "--tile", "--extractor", "-o", "--voxelizer", "--voxelizer-option",
+               "--exterior-band", "--interior-band", "--isovalue", "--max-loss", "--mask", "--frustum",
+               "--frustum-resolution", "--outside", "--tolerance-grid"},
               "with --error and --triangles the method is chosen for the bound");
   const auto error = [&](double diagonal) {
     return arguments.triangles ? 0.0 : error_in_world_units(arguments.error, session.units, diagonal);
@@ -465,6 +549,19 @@ void add_bound_options(CLI::App& command, CLI::App& size, ConvertArguments& argu
       ->check(CLI::PositiveNumber);
 }
 
+void add_tile_options(CLI::App& command, ConvertArguments& arguments) {
+  CLI::Option_group* group = command.add_option_group("For models larger than memory");
+  group
+      ->add_flag(
+          "--tiles{" + std::to_string(kDefaultTile) + "}", arguments.tiles,
+          "Work tile by tile, in memory of the size of a tile and the mesh; --tiles=256 for tiles of 256 "
+          "voxels (default: 512). Polygons must be closed, and parts thinner than the voxels are lost. "
+          "The same bytes as -o tile=512 --signs winding-number --thin drop")
+      ->check(CLI::Range(int(kLeastTile), 1 << 20));
+  group->add_option("--tile", arguments.tile,
+                    "I/N: make the tiles of job I of N, and write them to OUT as a part for hermesh join");
+}
+
 }  // namespace
 
 void add_conversions(CLI::App& app, Session& session) {
@@ -503,8 +600,10 @@ void add_conversions(CLI::App& app, Session& session) {
     refuse_idle(*command,
                 {"--over-holes", "--except-thin", "--through-volume", "--limit-points", "--smallest-voxel"},
                 "it needs --error or --triangles");
-    return run_remesh(*arguments, session);
+    return run_remesh(*arguments, *command, session);
   });
+  add_tile_options(*command, *arguments);
+  add_join(app, session);
 }
 
 }  // namespace hermesh::cli

@@ -168,6 +168,7 @@ class BlockTrees {
                   (in_.moment <= 0 || off <= kMomentShare * in_.moment);
     if (!node.merges) return node;
     node.place = in_.file.rounded(middle + x);
+    node.merges = in_.admits(node.place);
     node.quadric = q.about(node.place - middle);
     return node;
   }

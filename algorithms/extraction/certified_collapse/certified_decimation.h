@@ -42,17 +42,22 @@ struct Nearness {
 /// and kDistanceSlack of the coarse mesh, and every position on the coarse mesh is within the tolerance of
 /// some fine triangle and that slack; where tolerances differ, this need not be the nearest triangle. The
 /// result is identical for any number of threads.
-/// @param fine closed and oriented, or a complex of patches; index space
+/// @param fine closed and oriented, or a complex of patches, or open if all triangles around the vertices
+/// that
+///   are not pinned are part of it; index space
 /// @param tolerance by vertex of `fine`, voxels. Vertices with tolerance 0 do not move, and none is merged
 ///   into another; others may be merged into them.
 /// @param pinned by vertex of `fine`, or empty: further vertices that stay fixed. The ends of edges with more
 ///   than two triangles must be pinned, which preserves the boundaries of a complex's patches.
 /// @param file rounds positions to the file's precision
 /// @param pieces of each triangle of a complex (shell_volumes.h); empty for a closed mesh
+/// @param within open box that all positions of merged vertices lie in; it must contain the triangles around
+///   the vertices that are not pinned
 /// @throws Cancelled
 CertifiedMesh decimate_certified(const FineMesh& fine, const std::vector<float>& tolerance,
                                  std::vector<std::uint8_t> pinned, const FilePoints& file,
                                  RunContext& context, const Nearness& nearness = {},
-                                 std::span<const TrianglePieces> pieces = {});
+                                 std::span<const TrianglePieces> pieces = {},
+                                 const Bounds& within = Bounds::unbounded());
 
 }  // namespace hermesh

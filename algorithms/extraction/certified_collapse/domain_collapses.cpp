@@ -276,6 +276,7 @@ class DomainCollapses {
       mark_dirty(v);
       return false;
     }
+    if (!mesh_.input.admits(x)) return false;
     collapse_.v = v;
     collapse_.going = going;
     collapse_.x = x;

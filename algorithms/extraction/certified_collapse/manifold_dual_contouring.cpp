@@ -3,7 +3,9 @@
 #include "algorithms/core/option_table.h"
 #include "algorithms/core/parallel.h"
 #include "algorithms/extraction/certified_collapse/certified_decimation.h"
+#include "algorithms/extraction/certified_collapse/tile_mesh.h"
 #include "algorithms/extraction/certified_mesh.h"
+#include "algorithms/lattice/part_placement.h"
 
 namespace hermesh {
 namespace {
@@ -24,6 +26,31 @@ CertifiedPolygons by_collapses(UniformMesh uniform, const FieldAtPoints& field, 
       return asked[before] > 0 && result.points[point] != fine.points()[before];
     });
   return result;
+}
+
+PolygonMesh by_tiles(const HermiteView& grid, const ManifoldDualContouringOptions& options,
+                     const FilePoints& file, RunContext& context) {
+  std::vector<VertexKey> keys;
+  UniformMesh uniform = uniform_mesh(grid, options.uniform, file, context,
+                                     {.side = options.tile, .whole = options.whole, .keys = &keys});
+  report(uniform.counts, context);
+  TilePatches patches(std::move(uniform), std::move(keys),
+                      {.side = options.tile, .tolerance = options.tolerance, .nearness = options.nearness},
+                      file, std::nullopt);
+  std::vector<TileMesh> tiles;
+  for (const TileAt& tile : patches.tiles()) tiles.push_back(patches.decimated(tile, context));
+  return join_tiles(std::move(tiles), grid.placement().origin);
+}
+
+struct TileSide {
+  int tile = 0;
+};
+const OptionTable<TileSide>& tile_option_table() {
+  static const auto table = OptionTable<TileSide>().number(
+      "tile", &TileSide::tile, {.maximum = 1 << 20},
+      "side in voxels, a multiple of 8 from 16 on, of cubes that are decimated one by one, with the uniform "
+      "mesh between them, so that remesh --tiles gives the same bytes; 0 for none");
+  return table;
 }
 
 /// The options of the collapses in addition to those of all certified extractors.
@@ -48,6 +75,9 @@ const OptionTable<Nearness>& nearness_option_table() {
 PolygonMesh manifold_dual_contouring(const HermiteView& grid, const ManifoldDualContouringOptions& options,
                                      const AdaptivityField* field, RunContext& context) {
   const FilePoints file(grid.placement(), options.uniform.caps);
+  if (options.tile > 0 && field)
+    throw Error("option 'tile' cannot be combined with a mask or a grid of tolerances; omit one of them");
+  if (options.tile > 0) return by_tiles(grid, options, file, context);
   const FieldAtPoints at_points(field, grid.placement());
   UniformMesh uniform = uniform_mesh(grid, options.uniform, file, context);
   report(uniform.counts, context);
@@ -59,19 +89,46 @@ PolygonMesh manifold_dual_contouring(const HermiteView& grid, const ManifoldDual
       at_points, file, context);
 }
 
+ManifoldDualContouringOptions read_manifold_dual_contouring_options(const ExtractionInput& input,
+                                                                    const IndexToWorld& placement) {
+  const int tile = tile_option_table().read(input.options).tile;
+  if (tile % 8 != 0 || (tile > 0 && tile < kLeastTile))
+    throw Error("option 'tile' takes 0 and multiples of 8 from " + std::to_string(kLeastTile) + " on, not " +
+                std::to_string(tile));
+  return {.tolerance = asked_tolerance(input.options, placement),
+          .nearness = nearness_option_table().read(input.options),
+          .tile = tile,
+          .uniform = read_dual_contouring_options(input)};
+}
+
 PolygonMesh manifold_dual_contouring(const ExtractionInput& input) {
-  ManifoldDualContouringOptions options{.nearness = nearness_option_table().read(input.options),
-                                        .uniform = read_dual_contouring_options(input)};
-  return contour_certified(input, "manifold-dual-contouring", options.uniform.needs_normals(),
-                           [&](const HermiteView& grid, double tolerance) {
-                             options.tolerance = tolerance;
-                             return manifold_dual_contouring(grid, options, input.field, input.context);
-                           });
+  ManifoldDualContouringOptions options = read_manifold_dual_contouring_options(input, {});
+  const auto contour = [&](const ExtractionInput& from) {
+    return contour_certified(from, "manifold-dual-contouring", options.uniform.needs_normals(),
+                             [&](const HermiteView& grid, double tolerance) {
+                               options.tolerance = tolerance;
+                               return manifold_dual_contouring(grid, options, input.field, input.context);
+                             });
+  };
+  if (options.tile == 0 || !input.source) return contour(input);
+  // The placement of all parts of a volume.
+  options.whole = extent_of(*input.source, input.level_set.voxel_size());
+  const LevelSet placed = with_extent(input.level_set, options.whole);
+  return contour({.level_set = placed,
+                  .isovalue = input.isovalue,
+                  .source = input.source,
+                  .options = input.options,
+                  .context = input.context,
+                  .field = input.field,
+                  .hermite = input.hermite,
+                  .written_in_single = input.written_in_single,
+                  .caps = input.caps});
 }
 
 std::vector<OptionSpec> manifold_dual_contouring_options() {
   std::vector<OptionSpec> options = tolerance_options();
   for (OptionSpec& option : nearness_option_table().specs()) options.push_back(std::move(option));
+  for (OptionSpec& option : tile_option_table().specs()) options.push_back(std::move(option));
   for (OptionSpec& option : dual_contouring_options()) options.push_back(std::move(option));
   return options;
 }

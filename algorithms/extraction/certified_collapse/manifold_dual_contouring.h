@@ -8,6 +8,7 @@
 #include "algorithms/extraction/certified_collapse/certified_decimation.h"
 #include "algorithms/extraction/dual_contouring/dual_contouring.h"
 #include "algorithms/hermite/hermite_view.h"
+#include "algorithms/lattice/part_placement.h"
 
 namespace hermesh {
 
@@ -16,6 +17,8 @@ struct ManifoldDualContouringOptions {
   /// polygons, 0 the uniform mesh itself.
   double tolerance = 0.1;
   Nearness nearness = {};
+  int tile = 0;          ///< side in cells of the tiles that are decimated one by one (tile_mesh.h); 0: none
+  SampleBox whole = {};  ///< with tiles: UniformTiling::whole
   DualContouringOptions uniform;  ///< placement of the uniform mesh's vertices
 };
 
@@ -24,11 +27,17 @@ struct ManifoldDualContouringOptions {
 /// positions of the uniform mesh's vertices. If it excludes the outside of its mask, vertices outside are not
 /// merged, and triangles whose middle lies outside are omitted, unless they represent vertices inside; the
 /// mesh is open there.
+/// @throws Error for tiles with a field, or if join_tiles() does; as uniform_mesh() and FineMesh; Cancelled
 PolygonMesh manifold_dual_contouring(const HermiteView& grid, const ManifoldDualContouringOptions& options,
                                      const AdaptivityField* field, RunContext& context);
 
 /// Implements the table's entry.
 PolygonMesh manifold_dual_contouring(const ExtractionInput& input);
 std::vector<OptionSpec> manifold_dual_contouring_options();
+
+/// Returns the options given for the entry, with the tolerance in voxels of a lattice. @throws Error for an
+/// invalid side of tiles
+ManifoldDualContouringOptions read_manifold_dual_contouring_options(const ExtractionInput& input,
+                                                                    const IndexToWorld& placement);
 
 }  // namespace hermesh

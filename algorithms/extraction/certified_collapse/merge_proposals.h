@@ -25,6 +25,11 @@ struct DecimationInput {
   /// around the edge: memoryless, cheapest first (Lindstrom & Turk 1998).
   double moment;
   const FilePoints& file;  ///< rounds positions to the file's precision
+  Bounds within;           ///< open box that contains all positions of merged vertices
+
+  bool admits(const Eigen::Vector3d& place) const {
+    return (place.array() > within.lower.array()).all() && (place.array() < within.upper.array()).all();
+  }
 };
 
 /// Returns the sets of vertices that edges connect within lattice-aligned blocks of 2, 4, 8 and 16 voxels,

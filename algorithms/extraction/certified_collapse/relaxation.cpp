@@ -240,8 +240,8 @@ void propose_relaxation(MergeForest& forest, const MergedMesh& merged, const Dec
     for (std::uint32_t v = 0; v < merged.leaders.size(); ++v) {
       if (relaxation.is_pinned(v)) continue;
       const Vector3d& before = merged.mesh->points()[v];
-      move(forest, merged.leaders[v], input.file.rounded(before + part * (relaxation.places()[v] - before)),
-           input);
+      const Vector3d place = input.file.rounded(before + part * (relaxation.places()[v] - before));
+      if (input.admits(place)) move(forest, merged.leaders[v], place, input);
     }
   forest.settle();
 }

@@ -52,6 +52,7 @@ CellBlocks::CellBlocks(const CellGrid& grid, RunContext& context)
       for (const BlockMask& corner : signs) all &= corner[word], some |= corner[word];
       block.active[word] = (some & ~all) | block.joints[word];
     }
+    if (!grid_.is_complete(source_[b].lower)) std::ranges::fill(block.active, 0);
     codes[b] = count_before(block);
     found[b].reserve(codes[b]);
     for_each_bit(block.active, [&](int cell) {
@@ -105,6 +106,7 @@ void CellBlocks::draw_ambiguous_faces(RunContext& context) {
       for (int face = 1; face < 6; face += 2) {
         if (!((sheets(block, cell).ambiguous_faces >> face) & 1)) continue;
         const Cell upper = beside(block, cell, face);
+        if (!is_active(upper)) continue;
         if (!is_joint(block, cell) && !is_joint(upper.block, upper.cell) &&
             grid_.is_of_one_piece(block, cell, face))
           faces[b].push_back({block, cell, face, normals_join(block, cell, face)});
@@ -178,7 +180,7 @@ bool CellBlocks::is_pinched(std::int32_t block, int cell, int face) const {
   const CellSheets& own = sheets(block, cell);
   if (!((own.ambiguous_faces >> face) & 1) || !has_one_sheet(own, face)) return false;
   const Cell there = beside(block, cell, face);
-  return has_one_sheet(sheets(there.block, there.cell), face ^ 1);
+  return is_active(there) && has_one_sheet(sheets(there.block, there.cell), face ^ 1);
 }
 
 CellBlocks::Cell CellBlocks::beside(std::int32_t block, int cell, int face) const {
@@ -237,6 +239,10 @@ Eigen::Vector3d CellBlocks::rounding_in_file() const {
                            block.lower[2] - placement.base[2]);
   };
   const Eigen::Vector3d side = Eigen::Vector3d::Constant(8);
+  if (const SampleBox whole = grid_.whole(); !whole.empty()) {
+    const Eigen::Vector3d base(placement.base[0], placement.base[1], placement.base[2]);
+    include(whole.lower.cast<double>() - base, whole.upper.cast<double>() - base);
+  }
   if (placement.linear.isDiagonal(0)) {  // then the corners of the bounding box suffice
     Eigen::AlignedBox3d box;
     for (const HermiteView::Block& block : source_) box.extend(lower_of(block));
@@ -336,9 +342,7 @@ bool CellBlocks::has_explicit_face(std::int32_t block, int cell) const {
   if (own.sheets > 1 || own.ambiguous_faces != 0) return true;
   for (int face = 0; face < 6; ++face) {
     const Cell there = beside(block, cell, face);
-    if (there.block >= 0 && test(blocks_[there.block].active, there.cell) &&
-        sheets(there.block, there.cell).sheets > 1)
-      return true;
+    if (is_active(there) && sheets(there.block, there.cell).sheets > 1) return true;
   }
   return false;
 }

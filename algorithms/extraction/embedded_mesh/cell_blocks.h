@@ -21,7 +21,7 @@
 #include "algorithms/extraction/embedded_mesh/cell_sheets.h"
 #include "algorithms/hermite/hermite_view.h"
 #include "algorithms/lattice/active_cells.h"
-#include "algorithms/lattice/placement.h"
+#include "algorithms/lattice/part_placement.h"
 
 namespace hermesh {
 
@@ -80,6 +80,11 @@ class CellGrid {
   virtual std::array<std::uint32_t, 2> pieces(std::int32_t /*block*/, int /*sample*/, int /*axis*/) const {
     return {1, 0};
   }
+  /// Returns false for a block, given by the index coordinates of its first sample, whose cells lack data,
+  /// because the lattice is part of a larger one. They are inactive.
+  virtual bool is_complete(const std::array<std::int32_t, 3>& /*lower*/) const { return true; }
+  /// Returns a box that contains the blocks of the lattice that this one is part of; empty if it is whole.
+  virtual SampleBox whole() const { return {}; }
 };
 
 /// Signs, sheets, vertices and edges of all active cells of a CellGrid. Lengths are in voxels, positions in
@@ -206,9 +211,11 @@ class CellBlocks {
     for (int dx = -steps; dx <= steps; ++dx)
       for (int dy = -steps; dy <= steps; ++dy)
         for (int dz = -steps; dz <= steps; ++dz)
-          if (const Cell at = locate(cell.block, x + dx, y + dy, z + dz);
-              at.block >= 0 && test(blocks_[at.block].active, at.cell))
-            f(at);
+          if (const Cell at = locate(cell.block, x + dx, y + dy, z + dz); is_active(at)) f(at);
+  }
+  /// Returns true if a cell that locate() or cell_around() returned exists and is active.
+  bool is_active(const Cell& cell) const {
+    return cell.block >= 0 && test(blocks_[cell.block].active, cell.cell);
   }
   /// Returns an edge of a cell, numbered as in cell_sheets.h; its `block` is −1 if no block has its first
   /// sample.

@@ -83,6 +83,7 @@ void EdgePolygons::decide_again(const std::vector<CellBlocks::Cell>& cells, cons
                                 RunContext& context) {
   for (const CellBlocks::Cell& cell : cells)
     cells_.for_each_crossed_edge_of(cell, [&](const CellBlocks::Edge& at) {
+      if (!test(edges(at.block, at.axis), at.sample)) return;
       decide(at, cells_.grid().crossing(at.block, at.sample, at.axis).offset, points);
     });
   number_all(context);

@@ -212,11 +212,21 @@ class Star {
   std::optional<std::vector<SidedTriangle>> nearby_;
 };
 
+/// Returns true if the cells of a block are fewer than kStillCells from the faces of their tile: with a whole
+/// number of blocks in either length, all or none are.
+bool is_at_face_of_tile(const std::array<std::int32_t, 3>& lower, int tile) {
+  static_assert(kStillCells == 8);
+  return std::ranges::any_of(lower, [&](std::int32_t from) {
+    const int within = (from % tile + tile) % tile;
+    return within < kStillCells || within >= tile - kStillCells;
+  });
+}
+
 }  // namespace
 
 void move_points(const CellBlocks& cells, EdgePolygons& polygons,
                  const std::vector<std::vector<PointTarget>>& targets, const FilePoints& file,
-                 UniformPoints& points, RunContext& context) {
+                 UniformPoints& points, int tile, RunContext& context) {
   Stage stage(context, "move points");
   PolygonNeighbourhood mesh(cells, polygons, points, kFarthestFromCell);
   std::vector<std::vector<CellBlocks::Edge>> turned(cells.size());
@@ -232,6 +242,7 @@ void move_points(const CellBlocks& cells, EdgePolygons& polygons,
         const auto block = static_cast<std::int32_t>(b);
         const auto& lower = cells.grid().blocks()[b].lower;
         if (((lower[0] >> 3 & 1) | (lower[1] >> 3 & 1) << 1 | (lower[2] >> 3 & 1) << 2) != parity) return;
+        if (tile > 0 && is_at_face_of_tile(lower, tile)) return;
         Star star(cells, polygons, mesh, points);
         for (const PointTarget& target : targets[b]) {
           const Vector3d from = points[cells.point(block, target.cell, 0)];

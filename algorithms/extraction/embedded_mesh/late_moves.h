@@ -15,6 +15,9 @@ namespace hermesh {
 /// position may start, so that they are found through the lattice.
 inline constexpr double kFarthestFromCell = 1.0;
 
+/// Vertices of cells fewer than this many cells from the faces of their tile do not move (move_points()).
+inline constexpr int kStillCells = 8;
+
 /// Moves vertices to their targets, or part of the way. The rule of tetrahedra (uniform_mesh.h) is sufficient
 /// for an embedded mesh, but not necessary: here a vertex moves if its polygons would intersect neither each
 /// other nor any polygon nearby (triangle_contact.h), so an embedded mesh remains embedded. `targets` are by
@@ -29,11 +32,16 @@ inline constexpr double kFarthestFromCell = 1.0;
 /// component is 1 on one side of q and 0 on the other; afterwards both differ by k. As the mesh is embedded
 /// after the move, too, its orientation is unchanged if and only if k is 0. A vertex moves only if k is 0 for
 /// each piece whose boundary it is on.
+///
+/// **Tiles.** With tiles (UniformTiling) no vertex of a cell within kStillCells of the faces of its tile
+/// moves. What a move depends on lies in cells up to seven away, so moves in one tile do not depend on those
+/// in another, and a tile is the same whether the lattice around it is complete or ends a little beyond it.
+/// @param tile side of the tiles in cells, a multiple of 8; 0 if there are none
 /// @param polygons quads with a triangle that a move would leave without area are cut along the other
 /// diagonal
 /// @throws Cancelled
 void move_points(const CellBlocks& cells, EdgePolygons& polygons,
                  const std::vector<std::vector<PointTarget>>& targets, const FilePoints& file,
-                 UniformPoints& points, RunContext& context);
+                 UniformPoints& points, int tile, RunContext& context);
 
 }  // namespace hermesh

@@ -44,8 +44,9 @@ double volume(const Vector3d& a, const Vector3d& b, const Vector3d& c, const Vec
 class UniformContourer {
  public:
   UniformContourer(const CellGrid& grid, const DualContouringOptions& options, const FilePoints& file,
-                   RunContext& context, PolygonEdges* numbers)
+                   RunContext& context, PolygonEdges* numbers, const UniformTiling& tiling = {})
       : numbers_(numbers),
+        tiling_(tiling),
         cells_(grid, context),
         options_(options),
         reach_(std::min(options.reach, kFarthestFromCell)),
@@ -68,12 +69,14 @@ class UniformContourer {
     // made. Late moves change positions only.
     place_all_points(context);
     let_points_leave(context);
-    EdgePolygons polygons = connect(nullptr, context);
+    const std::optional<EdgeMasks> edges = edges_of_active_cells(cells_, context);
+    EdgePolygons polygons = connect(edges ? &*edges : nullptr, context);
     UniformMesh mesh;
-    move_points(cells_, polygons, targets_, file_, points_, context);
+    move_points(cells_, polygons, targets_, file_, points_, tiling_.side, context);
     fill(polygons, mesh, context);
     // Only vertices with a target can have left their cells.
     for_each_with_target([&](double outside) { counts_.escaped += outside > cells_.rounding().maxCoeff(); });
+    if (tiling_.keys) *tiling_.keys = vertex_keys(cells_, polygons, context);
     mesh.points = points_.take();
     mesh.counts = std::move(counts_);
     return mesh;
@@ -470,23 +473,25 @@ class UniformContourer {
       PlainPoints near;
       near.read(cells_, block);
       cells_.for_each_crossing_edge(block, [&](const CellBlocks::Edge& edge) {
+        const std::uint32_t own = number++;
+        if (!test(polygons.edges(block, edge.axis), edge.sample)) return;
         polygons.polygons_of(
             edge,
             [&](const Quad& q) {
-              if (numbers_) numbers_->quads[quad] = number;
+              if (numbers_) numbers_->quads[quad] = own;
               mesh.quads[quad++] = q;
             },
             [&](const Triangle& t) {
-              if (numbers_) numbers_->triangles[triangle] = number;
+              if (numbers_) numbers_->triangles[triangle] = own;
               mesh.triangles[triangle++] = t;
             },
             &near);
-        ++number;
       });
     });
   }
 
   PolygonEdges* const numbers_;
+  const UniformTiling tiling_;
   CellBlocks cells_;
   const DualContouringOptions options_;
   const double reach_;  ///< largest distance of vertices from their cells, voxels
@@ -506,9 +511,16 @@ class UniformContourer {
 /// The lattice of Hermite data, which have no cuts.
 class HermiteCells : public CellGrid {
  public:
-  explicit HermiteCells(const HermiteView& view) : view_(view) {}
+  explicit HermiteCells(const HermiteView& view, const UniformTiling& tiling = {})
+      : view_(view), tiling_(tiling) {}
   const HermiteView::Blocks& blocks() const override { return view_.blocks(); }
   const IndexToWorld& placement() const override { return view_.placement(); }
+  bool is_complete(const std::array<std::int32_t, 3>& lower) const override {
+    for (int a = 0; a < 3; ++a)
+      if (lower[a] < tiling_.known.lower[a] || lower[a] >= tiling_.known.upper[a]) return false;
+    return true;
+  }
+  SampleBox whole() const override { return tiling_.whole; }
   EdgeCrossing crossing(std::int32_t block, int sample, int axis) const override {
     return view_.crossing(block, sample, axis);
   }
@@ -516,13 +528,14 @@ class HermiteCells : public CellGrid {
 
  private:
   const HermiteView& view_;
+  const UniformTiling tiling_;
 };
 
 }  // namespace
 
 UniformMesh uniform_mesh(const HermiteView& grid, const DualContouringOptions& options,
-                         const FilePoints& file, RunContext& context) {
-  return uniform_mesh(HermiteCells(grid), options, file, context);
+                         const FilePoints& file, RunContext& context, const UniformTiling& tiling) {
+  return UniformContourer(HermiteCells(grid, tiling), options, file, context, nullptr, tiling).run(context);
 }
 
 struct UniformCells::Made {

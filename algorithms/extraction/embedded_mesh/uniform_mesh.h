@@ -81,6 +81,7 @@
 #include "algorithms/extraction/embedded_mesh/edge_polygons.h"
 #include "algorithms/extraction/embedded_mesh/file_points.h"
 #include "algorithms/extraction/embedded_mesh/uniform_points.h"
+#include "algorithms/extraction/embedded_mesh/uniform_tiling.h"
 #include "algorithms/hermite/hermite_view.h"
 
 namespace hermesh {
@@ -113,7 +114,7 @@ struct UniformMesh {
 /// (CellBlocks);
 ///   Cancelled
 UniformMesh uniform_mesh(const HermiteView& grid, const DualContouringOptions& options,
-                         const FilePoints& file, RunContext& context);
+                         const FilePoints& file, RunContext& context, const UniformTiling& tiling = {});
 
 /// The uniform mesh with vertices confined to their cells (`reach` is 0), computed only where requested.
 class UniformCells {

@@ -35,14 +35,14 @@ BlockAt block_of_centre(const Bounds& box) {
 
 double gap(double low, double high, double from, double to) { return std::max({0.0, low - to, from - high}); }
 
-/// Calls f(block) for the blocks with a voxel nearer than `reach` to the box.
+/// Calls f(block) for the blocks of `within` with a voxel nearer than `reach` to the box.
 template <class F>
-void for_each_block_near(const Bounds& box, double reach, F&& f) {
+void for_each_block_near(const Bounds& box, double reach, const BoundsOf<std::int32_t>& within, F&& f) {
   BlockAt from, to;
   for (int a = 0; a < 3; ++a) {
     // Only samples count, so the first block is that of the first sample within reach.
-    from[a] = block_of(std::ceil(box.lower[a] - reach));
-    to[a] = block_of(std::floor(box.upper[a] + reach));
+    from[a] = std::max(within.lower[a], block_of(std::ceil(box.lower[a] - reach)));
+    to[a] = std::min(within.upper[a], block_of(std::floor(box.upper[a] + reach)));
   }
   const auto gap2 = [&](int axis, std::int32_t b) {
     const double g = gap(box.lower[axis], box.upper[axis], 8.0 * b, 8.0 * b + 7.0);
@@ -241,9 +241,16 @@ bool TriangleBins::is_large(const Bounds& box) {
 }
 
 TriangleBins::TriangleBins(const IndexSoup& soup, double reach, RunContext& context)
-    : soup_(soup), context_(context), reach_(reach), rings_(int(std::ceil((reach + 0.5 * kLargest) / 8.0))) {
+    : TriangleBins(soup, reach, context, BoundsOf<std::int32_t>::unbounded()) {}
+
+TriangleBins::TriangleBins(const IndexSoup& soup, double reach, RunContext& context,
+                           const BoundsOf<std::int32_t>& within)
+    : soup_(soup),
+      context_(context),
+      reach_(reach),
+      rings_(int(std::ceil((reach + 0.5 * kLargest) / 8.0))) {
   Survey found = survey();
-  choose_blocks(found);
+  choose_blocks(found, within);
   pack(found);
   choose_slabs();
   if (slabs_.size() == 1) go_to_slab(0);
@@ -361,7 +368,7 @@ void TriangleBins::choose_slabs() {
 }
 
 /// Finds the blocks near any triangle, and files the large triangles under theirs.
-void TriangleBins::choose_blocks(const Survey& survey) {
+void TriangleBins::choose_blocks(const Survey& survey, const BoundsOf<std::int32_t>& within) {
   const std::size_t chunks = survey.bins.size();
   std::vector<BlockSet> sets(2 * chunks);
   std::vector<Pairs> pairs(chunks);
@@ -369,10 +376,10 @@ void TriangleBins::choose_blocks(const Survey& survey) {
     for (const BinRun& run : survey.runs[chunk]) {
       context_.check();
       // The box of a run gives a few blocks too many, in far less time than those of its triangles.
-      for_each_block_near(from_sixteenths(run.box, survey.bins[chunk].block(run.code)), reach_,
+      for_each_block_near(from_sixteenths(run.box, survey.bins[chunk].block(run.code)), reach_, within,
                           [&](const BlockAt& block) { sets[chunk].insert(block); });
     }
-    pairs[chunk] = file_large(all_large_[chunk], sets[chunks + chunk]);
+    pairs[chunk] = file_large(all_large_[chunk], within, sets[chunks + chunk]);
   });
   blocks_ = BlockTable(sets);
   first_large_.assign(blocks_.size() + 1, 0);
@@ -395,12 +402,13 @@ void TriangleBins::choose_blocks(const Survey& survey) {
 
 /// Returns the blocks near each large triangle, as codes of `blocks`, to which they are added.
 TriangleBins::Pairs TriangleBins::file_large(const std::vector<std::uint32_t>& triangles,
+                                             const BoundsOf<std::int32_t>& within,
                                              BlockSet& blocks) const {
   Pairs pairs;
   for (const std::uint32_t t : triangles) {
     context_.check();
     const TriangleSlab slab(soup_.corners(t));
-    for_each_block_near(in_voxels(box_of(t)), reach_, [&](const BlockAt& block) {
+    for_each_block_near(in_voxels(box_of(t)), reach_, within, [&](const BlockAt& block) {
       if (slab.near(block, reach_)) pairs.emplace_back(blocks.insert(block), t);
     });
   }

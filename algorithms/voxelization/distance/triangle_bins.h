@@ -53,6 +53,9 @@ class TriangleBins {
   /// the context must outlive the bins.
   /// @throws Cancelled.
   TriangleBins(const IndexSoup& soup, double reach, RunContext& context);
+  /// @param within blocks() contains only the blocks of this box, whose faces belong to it
+  TriangleBins(const IndexSoup& soup, double reach, RunContext& context,
+               const BoundsOf<std::int32_t>& within);
 
   /// Returns the blocks that may have a voxel within reach of a triangle.
   const BlockTable& blocks() const { return blocks_; }
@@ -108,9 +111,10 @@ class TriangleBins {
   Survey survey();
   void pack(Survey& survey);
   void choose_slabs();
-  void choose_blocks(const Survey& survey);
+  void choose_blocks(const Survey& survey, const BoundsOf<std::int32_t>& within);
   using Pairs = std::vector<std::pair<std::uint32_t, std::uint32_t>>;  ///< a block and a large triangle
-  Pairs file_large(const std::vector<std::uint32_t>& triangles, BlockSet& blocks) const;
+  Pairs file_large(const std::vector<std::uint32_t>& triangles, const BoundsOf<std::int32_t>& within,
+                   BlockSet& blocks) const;
   enum class Purpose { all_blocks, few_questions };
   Files make_files(const std::vector<std::uint32_t>& bins, Purpose purpose) const;
   void unpack(std::uint32_t bin, std::uint32_t* to) const;

@@ -206,8 +206,14 @@ struct InnerEdge {
 class Finder {
  public:
   Finder(const IndexSoup& soup, const TriangleBins& bins, const Band& band, const Signs& signs,
-         RunContext& context)
-      : soup_(soup), bins_(bins), band_(band), inside_(signs.inside), caps_(signs.caps), context_(context) {}
+         RunContext& context, const WindingNumber* winding)
+      : soup_(soup),
+        bins_(bins),
+        band_(band),
+        inside_(signs.inside),
+        caps_(signs.caps),
+        context_(context),
+        winding_(winding) {}
 
   InteriorFaces run(double reach, double voxel_size) {
     find_suspects();
@@ -503,8 +509,10 @@ class Finder {
     const bool little_doubt = doubtful.size() <= kFew || inner_area >= double(kTheRule) * doubtful_area;
     const bool quick = little_doubt && soup_.size() <= kSmallModel;
     if (!quick && inner_triangles < kTheRule * doubtful_triangles) return;
+    if (winding_) wind(doubtful, *winding_);
     // Faces that agree on no side have no meaningful numbers.
-    if (const OrientedWinding winding(soup_); winding.usable()) wind(doubtful, winding.number());
+    else if (const OrientedWinding winding(soup_); winding.usable())
+      wind(doubtful, winding.number());
   }
 
   /// Decides about unknown sides by winding numbers. Outside of all closed parts the number is 0, whatever
@@ -571,6 +579,7 @@ class Finder {
   const std::vector<BlockMask>& inside_;
   const std::vector<TriangleCorners>& caps_;
   RunContext& context_;
+  const WindingNumber* const winding_;
   Suspects suspects_;
   std::vector<std::uint32_t> triangles_;          ///< those that touch suspicious voxels, by number
   std::vector<std::vector<TriangleFace>> faces_;  ///< of each; none if no other crosses it
@@ -580,8 +589,9 @@ class Finder {
 }  // namespace
 
 InteriorFaces find_interior_faces(const IndexSoup& soup, const TriangleBins& bins, const Band& band,
-                                  const Signs& signs, double reach, double voxel_size, RunContext& context) {
-  return Finder(soup, bins, band, signs, context).run(reach, voxel_size);
+                                  const Signs& signs, double reach, double voxel_size, RunContext& context,
+                                  const WindingNumber* winding) {
+  return Finder(soup, bins, band, signs, context, winding).run(reach, voxel_size);
 }
 
 }  // namespace hermesh

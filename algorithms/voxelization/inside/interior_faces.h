@@ -29,8 +29,10 @@ struct InteriorFaces {
 /// along every line, their uncertain parts stay, and a note reports that.
 /// @param reach how far distances matter, in voxels
 /// @param voxel_size in world units
+/// @param winding the winding number if `soup` is part of a mesh; null if it is the whole mesh
 /// @throws Cancelled.
 InteriorFaces find_interior_faces(const IndexSoup& soup, const TriangleBins& bins, const Band& band,
-                                  const Signs& signs, double reach, double voxel_size, RunContext& context);
+                                  const Signs& signs, double reach, double voxel_size, RunContext& context,
+                                  const WindingNumber* winding = nullptr);
 
 }  // namespace hermesh

@@ -203,7 +203,8 @@ class WindingSigns {
           at[std::size_t(axis)] += side ? 1 : -1;
           if (asked_.count(at)) continue;
           const std::uint64_t ours = face(inside, axis, side);
-          if (table_.find(at) == BlockTable::kNone ? ours != 0 && ours != ~0ull
+          // A closed surface leaves the blocks only at the ends of a part of space.
+          if (table_.find(at) == BlockTable::kNone ? open_ && ours != 0 && ours != ~0ull
                                                    : leads_to(block, at, axis, side))
             next.insert(at);
         }
