@@ -122,7 +122,6 @@ TilePart remesh_tiles(const PolygonMesh& mesh, const VoxelizeRecipe& voxelizing,
   const std::vector<TileAt> tiles = tiles_at(mesh, voxel_size, options.tile);
   const OneProgress progress(context, "tiles");
   const std::size_t first_stage = context.stage_seconds.size();
-  UniformCounts counts;
   for (std::size_t i = std::size_t(job.number) - 1; i < tiles.size(); i += std::size_t(job.count)) {
     progress.update(double(i) / double(tiles.size()));
     SampleBox box;
