@@ -90,7 +90,8 @@ TEST(Relaxation, BringsAPointBackThatWasMovedOff) {
   MergeForest forest = one_move(fine, 100, 1.02 * home);
   MergeProof proof(forest, fine, tolerance, context);
   const FilePoints file{IndexToWorld()};
-  propose_relaxation(forest, proof.prove(), {fine, tolerance, pinned, 0.0, file}, 4, context);
+  propose_relaxation(forest, proof.prove(), {fine, tolerance, pinned, 0.0, file, Bounds::unbounded()}, 4,
+                     context);
   // With all others unmoved the sum of squares is 0 at the vertex's origin, 0.4 below; along the sphere,
   // where it hardly grows, the vertex may be elsewhere.
   const Vector3d& place = forest.node(forest.set_of(100)).place;
@@ -149,7 +150,8 @@ TEST(Relaxation, EndsWhenTheWorkIsCancelled) {
   const std::atomic<bool> cancel = true;
   context.cancel = &cancel;
   const FilePoints file{IndexToWorld()};
-  EXPECT_THROW(propose_relaxation(forest, merged, {fine, tolerance, pinned, 0.0, file}, 1, context),
+  EXPECT_THROW(propose_relaxation(forest, merged, {fine, tolerance, pinned, 0.0, file, Bounds::unbounded()},
+                                  1, context),
                Cancelled);
 }
 
