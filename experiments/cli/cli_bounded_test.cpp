@@ -63,10 +63,11 @@ TEST_F(CliBoundedTest, ThinPartsAreExceptedAndListed) {
         "0.30311 2\n"
         "4 0 3 2 1\n4 4 5 6 7\n4 0 1 5 4\n4 1 2 6 5\n4 2 3 7 6\n4 3 0 4 7\n"
         "4 8 11 10 9\n4 12 13 14 15\n4 8 9 13 12\n4 9 10 14 13\n4 10 11 15 14\n4 11 8 12 15\n");
-  const Outcome refused = run_to(1, "remesh thin.off out.ply --error 2% --thin drop");
+  const Outcome refused = run_to(1, "remesh thin.off out.ply --error 2% --thin drop --through-volume");
   EXPECT_PRED2(has, refused.err, "--except-thin");
   EXPECT_EQ(files().count("out.ply"), 0u);
-  const Json report = json_of("remesh thin.off out.ply --error 2% --thin drop --except-thin --json");
+  const Json report =
+      json_of("remesh thin.off out.ply --error 2% --thin drop --through-volume --except-thin --json");
   EXPECT_EQ(report.at("exit_code"), 0);
   const Json& exceptions = report.at("result").at("exceptions");
   ASSERT_FALSE(exceptions.empty());

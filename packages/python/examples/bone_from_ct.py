@@ -44,11 +44,11 @@ if len(sys.argv) > 1:
 
 # Without models it prints
 #   scan: 100 x 110 x 80 samples, -1000 to 1200 HU
-#   bone: 10972 triangles, 2 surfaces, 667.5 cm³
+#   bone: 10974 triangles, 2 surfaces, 667.5 cm³
 #   watertight: True
 
 # With that of $HERMESH_DATA it prints
 #   scan: 256 x 256 x 108 samples, -1024 to 2986 HU
-#   bone: 108652 triangles, 207 surfaces, 610.8 cm³
+#   bone: 108664 triangles, 207 surfaces, 610.7 cm³
 #   watertight: True
 #   note: the surface runs into the end of the data (-y, -z) and was closed half a voxel beyond its last samples; see --ends

@@ -66,11 +66,13 @@ class SameBytes(unittest.TestCase):
         hermesh.write_mesh(plate, (np.vstack([points, points * [1, 1, 0.0001] + [0, 0, 1.3037]]),
                                    np.vstack([quads, quads + 8])))
         with self.assertRaises(hermesh.Error):
-            hermesh.remesh_within(plate, error=0.05, thin="drop")
+            hermesh.remesh_within(plate, error=0.05, thin="drop", through_volume=True)
         with self.assertWarns(hermesh.Note):
-            made = hermesh.remesh_within(plate, error=0.05, thin="drop", except_thin=True)
+            made = hermesh.remesh_within(plate, error=0.05, thin="drop", through_volume=True,
+                                         except_thin=True)
         theirs, ours = self.folder / "program.ply", self.folder / "module.ply"
-        self.program("remesh", plate, theirs, "--error", 0.05, "--thin", "drop", "--except-thin")
+        self.program("remesh", plate, theirs, "--error", 0.05, "--thin", "drop", "--through-volume",
+                     "--except-thin")
         made.mesh.write(ours)
         self.assertEqual(theirs.read_bytes(), ours.read_bytes())
         self.assertTrue(made.exceptions)
