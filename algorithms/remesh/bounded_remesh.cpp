@@ -147,7 +147,7 @@ class BoundedRemesher {
   }
 
  private:
-  /// Returns true if the polygons are a valid mesh of the solid as they are, or become one when few triangles
+  /// Returns true if the polygons are already a valid mesh of the solid, or become one when few triangles
   /// that meet others are collapsed. The whole error is then left to the collapses. Lengths are measured in a
   /// power of two, so that vertices are exact.
   ///
@@ -200,6 +200,9 @@ class BoundedRemesher {
     }
     if (!collapse_all(now, surface, apart).empty()) return false;
     if (!is_embedded && !is_solid(result_.mesh)) return false;
+    if (!is_embedded)
+      context_.note(std::to_string(polygons->pairs.size()) +
+                    " pairs of polygons intersect, and were collapsed within the error");
     result_.voxel_size = 0.0;
     note_surface(now);
     return true;

@@ -1,5 +1,5 @@
-// Polygons that are, mostly, a valid mesh of a solid as they are, so that a bounded remeshing needs no
-// volume.
+// Polygons that are already a valid mesh of a solid, except for few triangles, so that a bounded remeshing
+// needs no volume.
 #pragma once
 
 #include <Eigen/Core>

@@ -469,8 +469,7 @@ int run_bounded(const ConvertArguments& arguments, const CLI::App& command, Sess
   report_thin_parts(made.thin, session);
   report_exceptions(made, session);
   print_extracted(session, made.mesh,
-                  made.voxel_size > 0.0 ? "voxels of " + text(made.voxel_size)
-                                        : "no volume: the polygons are a valid mesh",
+                  made.voxel_size > 0.0 ? "voxels of " + text(made.voxel_size) : "without a volume",
                   watch.seconds());
   const double bound = std::max(made.to_surface, made.from_surface);
   print_summary(session, "certified: the mesh is within " + text(made.to_surface) +
@@ -532,10 +531,9 @@ void add_bound_options(CLI::App& command, CLI::App& size, ConvertArguments& argu
                   "Where the bound cannot be reached (holes, walls and gaps too thin for the voxels), let it "
                   "hold elsewhere, and list these places in a note and in --json as balls (default: the "
                   "command fails)");
-  group->add_flag(
-      "--through-volume", arguments.through_volume,
-      "Make a volume also if the polygons are a closed, manifold mesh free of self-intersection "
-      "(default: such a mesh is simplified as it is, which preserves its topology and is faster)");
+  group->add_flag("--through-volume", arguments.through_volume,
+                  "Make a volume also if the polygons are a closed, manifold mesh free of self-intersection "
+                  "(default: such a mesh is simplified itself, which preserves its topology and is faster)");
   group
       ->add_option("--limit-points", arguments.most_points,
                    "Maximum number of vertices of the finest mesh (default: 3e7, some 9 GiB, with --error; "

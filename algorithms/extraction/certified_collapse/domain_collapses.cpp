@@ -411,7 +411,7 @@ class DomainCollapses {
 std::vector<Join> collapse_in_domain(DecimatedMesh& mesh, Collapses kind, const Domain& domain,
                                      std::span<const std::uint32_t> triangles,
                                      std::vector<std::uint32_t>& local, const RunContext& context) {
-  // Without an edge to test, a domain is left as it is.
+  // A domain without an edge to test does not change.
   if (std::ranges::none_of(triangles, [&](std::uint32_t t) {
         return std::ranges::any_of(mesh.triangles[t], [&](std::uint32_t p) { return mesh.dirty[p] != 0; });
       }))

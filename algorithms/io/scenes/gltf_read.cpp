@@ -123,7 +123,7 @@ std::string bytes_of_uri(std::string_view uri, const MeshBuilder& builder) {
     fail(" is an address; only files in the directory of the file are read, so save it there");
   const std::filesystem::path folder = std::filesystem::path(builder.file()).parent_path() / ".";
   std::error_code error;
-  // Some programs write names as they are, where % is no escape.
+  // Some programs do not encode names, so % is no escape there.
   std::filesystem::path relative = decode_percents(uri);
   if (!stays_below(relative) || !std::filesystem::is_regular_file(folder / relative, error))
     if (stays_below(uri) && std::filesystem::is_regular_file(folder / uri, error)) relative = uri;

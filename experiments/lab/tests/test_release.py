@@ -25,7 +25,8 @@ class Release(unittest.TestCase):
     def test_the_files_of_the_project_agree(self):
         # Between releases there are undated changes.
         for root in (ROOT, self.root):
-            self.assertEqual([problem for problem in release.problems(root) if "Unreleased" not in problem], [])
+            problems = [problem for problem in release.problems(root) if "Unreleased" not in problem]
+            self.assertEqual(problems, [])
 
     def test_each_file_with_another_version_or_date_is_named(self):
         version = release.version_of(ROOT)

@@ -454,7 +454,7 @@ def remesh_within(mesh: MeshLike, *, error: float | None = None, triangles: int 
     and reason. thin is as in remesh(); with "drop" and "refuse" a part that is too thin is an error.
     except_thin lets the bound hold except in the balls of `exceptions`, around such parts and holes, with a
     note, instead of raising an error. A mesh that is closed, manifold and free of self-intersection is
-    simplified as it is, without a volume, unless through_volume is set.
+    simplified itself, without a volume, unless through_volume is set.
     """
     mesh = as_mesh(mesh)
     with _Watching(progress, cancel, threads, log) as watch:

@@ -79,7 +79,7 @@ struct BoundOptions {
   bool written_in_single = false;        ///< as in ExtractOptions
   Thin thin = Thin::keep;  ///< otherwise a part that the smallest voxels do not show is an error
   /// True if a volume is made even if the polygons are a closed, manifold mesh free of self-intersection,
-  /// which is otherwise simplified as it is.
+  /// which is otherwise simplified itself.
   bool through_volume = false;
   /// True if the bound need not hold around holes, walls and gaps that no voxel size shows; otherwise these
   /// are an error.
