@@ -3,13 +3,15 @@
 # packages. The pages have the help of the program and the docstrings of the Python module, which are built
 # first if they are not up to date; the site itself takes less than a minute and needs no network.
 #   docs/build.sh --built    takes both from build/release without building them
+# $HERMESH and $HERMESH_PYTHON, if set, are a program and a folder with the module hermesh that are used instead,
+# e.g. /usr/bin/hermesh and /usr/lib/python3/dist-packages of the Debian packages; then nothing is compiled.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 . experiments/install_packages.sh
 
 out=build/docs
 install_packages "${docs_packages[@]}"
-if [ "${1:-}" != --built ]; then
+if [ "${1:-}" != --built ] && [ -z "${HERMESH_PYTHON:-}" ]; then
   install_packages "${hermesh_packages[@]}"
   mkdir -p "$out"
   echo "Building the program and the Python module (the first time takes some minutes)"
@@ -22,7 +24,9 @@ fi
 
 rm -rf "$out/python" "$out/html" "$out/doxygen"
 mkdir -p "$out/doxygen"
-/usr/bin/python3 -m zipfile -e build/release/packages/python/wheel/hermesh-*.whl "$out/python"
+if [ -z "${HERMESH_PYTHON:-}" ]; then
+  /usr/bin/python3 -m zipfile -e build/release/packages/python/wheel/hermesh-*.whl "$out/python"
+fi
 doxygen docs/Doxyfile
 SOURCE_DATE_EPOCH=$(git log -1 --format=%ct 2>/dev/null || echo 0)
 export SOURCE_DATE_EPOCH
