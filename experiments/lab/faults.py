@@ -294,7 +294,8 @@ def _closed_pipes(bench, command, count, chance):
 
 def _clock_jumps(bench, command, count, chance):
     library = bench.scratch / "clock.so"
-    subprocess.run(["cc", "-shared", "-fPIC", "-x", "c", "-", "-o", library], input=CLOCK, text=True, check=True)
+    subprocess.run(["cc", "-shared", "-fPIC", "-x", "c", "-", "-o", library], input=CLOCK, text=True,
+                   check=True)
     for _ in range(count):
         yield "clock jumps", bench.attempt(command, environment={"LD_PRELOAD": str(library)})
 
