@@ -29,6 +29,8 @@ class Contents(unittest.TestCase):
             with self.subTest(found=found):
                 self.assertEqual(faults.half_written(found, WHOLE), wrong)
                 self.assertEqual(faults.is_whole(found, WHOLE), found == WHOLE)
+        self.assertTrue(faults.is_whole(WHOLE, WHOLE | {"exploded.png": "a whole picture"}))
+        self.assertEqual(faults.half_written({"a.png": "12"}, {"a.png": "a whole picture"}), ["a.png"])
 
 
 @unittest.skipUnless(HERMESH.is_file(), "the program is not built")
