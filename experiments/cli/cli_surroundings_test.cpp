@@ -3,6 +3,7 @@
 #include <pty.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <thread>
 
@@ -194,6 +195,22 @@ TEST(TerminalProgressTest, IsNeverSilent) {
   int lines = 0;
   for (std::size_t at = 0; (at = sent.find("work  25 %", at)) != std::string::npos; ++at) ++lines;
   EXPECT_GE(lines, 2) << sent;
+}
+
+TEST(TerminalProgressTest, WritesLinesWhereNoTerminalIs) {
+  testing::internal::CaptureStderr();
+  {
+    RunContext context;
+    const TerminalProgress progress(context, true, {}, std::chrono::milliseconds(100));
+    context.progress("work", 0.25);
+    std::this_thread::sleep_for(std::chrono::milliseconds(1000));
+  }
+  const std::string sent = testing::internal::GetCapturedStderr();
+  EXPECT_NE(sent.find("hermesh: working for 1 s, work  25 %\n"), std::string::npos) << sent;
+  // After 100, 200, 400 and 800 ms, fewer on a loaded machine.
+  const auto lines = std::count(sent.begin(), sent.end(), '\n');
+  EXPECT_GE(lines, 2) << sent;
+  EXPECT_LE(lines, 4) << sent;
 }
 
 }  // namespace cli_surroundings_test

@@ -106,8 +106,9 @@ CLI::App* add_voxelize_options(CLI::App& command, VoxelizeArguments& arguments, 
                      "Name of the voxelizer, see hermesh list (default: " + arguments.voxelizer + ")");
   command.add_option(
       "--signs", arguments.signs,
-      "How the voxelizer hermesh finds the inside: auto (default), flood-fill, winding-number, "
-      "or unsigned for none; short for --voxelizer-option signs=...");
+      "How the voxelizer hermesh finds the inside: auto (default), flood-fill, winding-number (default of "
+      "remesh --error and --triangles), or unsigned for none; with --thin keep the default is auto-sheets, "
+      "i.e. auto without closing large holes; short for --voxelizer-option signs=...");
   command
       .add_option("--thin", arguments.thin,
                   "Walls, wires and open sheets thinner than the voxels: keep (default) thickens them until "
