@@ -9,6 +9,9 @@ hermesh_packages=(
   libexpat1-dev libbenchmark-dev libgtest-dev
   libopenvdb-tools python3 pybind11-dev python3-dev python3-numpy python3-scipy python3-matplotlib python3-jinja2 python3-venv)
 
+# To build the documentation site (docs/build.sh).
+docs_packages=(python3-sphinx python3-myst-parser python3-numpydoc python3-breathe doxygen furo)
+
 # To run sweeps on all cores of a machine, and to try them on a cluster of one node (experiments/sweep).
 sweep_packages=(snakemake)
 slurm_packages=(slurm-wlm munge)

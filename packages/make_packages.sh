@@ -1,10 +1,14 @@
 #!/usr/bin/env bash
 # Builds the Debian packages and the wheel: packages/make_packages.sh [BUILD], build/packages by default;
 # takes as long as building the program, less with ccache. Writes them to BUILD/debian; lintian, if installed,
-# must find no error in the packages. packages/check_clean_debian.sh tests them on a clean system.
+# must find no error in the packages. packages/check_clean_debian.sh tests them on a clean system, and
+# packages/check_reproducible.sh that two builds have the same bytes.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 build=${1:-build/packages}
+# The same bytes of the same commit: the date in the packages is that of the commit.
+SOURCE_DATE_EPOCH=${SOURCE_DATE_EPOCH:-$(git log -1 --format=%ct 2>/dev/null || echo 0)}
+export SOURCE_DATE_EPOCH
 cmake --preset release -B "$build" -DCMAKE_INSTALL_PREFIX=/usr -DBUILD_SHARED_LIBS=ON \
   -DHERMESH_DEBIAN_PACKAGES=ON -DHERMESH_BUILD_PYTHON=ON -DHERMESH_BUILD_TESTS=OFF -DHERMESH_BUILD_BENCHMARKS=OFF
 cmake --build "$build" -j "${JOBS:-$(nproc)}"

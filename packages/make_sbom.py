@@ -29,9 +29,9 @@ def dependencies():
 
 
 def installed_packages():
-    """Returns the packages that ./reproduce and ./test install."""
+    """Returns the packages that ./reproduce, ./test and docs/build.sh install."""
     text = (ROOT / "experiments/install_packages.sh").read_text()
-    return re.search(r"hermesh_packages=\((.*?)\)", text, re.DOTALL)[1].split()
+    return " ".join(re.findall(r"(?m)^(?:hermesh|docs)_packages=\((.*?)\)", text, re.DOTALL)).split()
 
 
 def problems():

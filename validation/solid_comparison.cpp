@@ -272,9 +272,12 @@ class SolidReference::Comparison {
   SolidComparison::Verdict verdict() const {
     using Verdict = SolidComparison::Verdict;
     const SolidComparison& r = result_;
-    if (r.reference_volume.value <= 0.0 || r.reference_area <= 0.0) return Verdict::unknown;
+    if (r.reference_area <= 0.0) return Verdict::unknown;
+    // No sample is in a reference that is much smaller than the mesh.
+    const double volume =
+        r.reference_volume.value > 0.0 ? r.reference_volume.value : r.reference_volume.upper;
     if (r.false_area.lower > kFalseShare * r.mesh_area || r.lost_area.lower > kLostShare * r.reference_area ||
-        r.unexplained.lower > kVolumeShare * r.reference_volume.value)
+        r.unexplained.lower > kVolumeShare * volume)
       return Verdict::differs;
     const bool known =
         r.reference_area > r.possible_area && r.reference_volume.value > r.unknown_volume.value;

@@ -267,6 +267,16 @@ TEST(SolidComparison, LostAndAddedPartsAreFound) {
   EXPECT_EQ(compared(body, body).verdict, Verdict::same);
 }
 
+TEST(SolidComparison, OneInOtherUnitsDiffers) {
+  // Of the samples in space, none is in the smaller one.
+  const MeshFile body = globe(1.0, {0, 0, 0}, 8);
+  for (const double factor : {25.4, 1000.0})
+    for (const double voxel : {0.0, 0.01}) {
+      EXPECT_EQ(compared(globe(factor, {0, 0, 0}, 8), body, voxel).verdict, Verdict::differs);
+      EXPECT_EQ(compared(body, globe(factor, {0, 0, 0}, 8), voxel).verdict, Verdict::differs);
+    }
+}
+
 TEST(SolidComparison, WhatACoarseVolumeCutsOffIsExplained) {
   // A box whose edges are cut at 0.4 voxels of 0.5, as marching cubes cuts them.
   const double c = 0.2;

@@ -13,6 +13,7 @@
 #include "algorithms/fracture/piece_attributes.h"
 #include "algorithms/fracture/scatter.h"
 #include "algorithms/hermite/test_lattice.h"
+#include "algorithms/search/transfer_attributes.h"
 
 namespace hermesh {
 namespace cutters_test {

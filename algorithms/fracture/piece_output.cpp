@@ -5,6 +5,7 @@
 
 #include "algorithms/core/run_context.h"
 #include "algorithms/fracture/piece_attributes.h"
+#include "algorithms/search/transfer_attributes.h"
 
 namespace hermesh {
 namespace {

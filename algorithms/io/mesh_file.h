@@ -27,6 +27,8 @@ struct MeshFile {
   /// Centre of the writer's single precision; hermesh stores it as a comment `origin x y z` so that reading
   /// back gives the same points.
   std::optional<Eigen::Vector3d> origin;
+  /// Length in metres of the unit of the points, as 3MF and glTF state it; 0 for other formats.
+  double metres = 0.0;
   /// If ReadOptions asked for them: the number in the file of each of triangulated()'s triangles, counting
   /// from 0 over the polygons in their order, each cut into as many triangles as it has corners less two.
   /// Empty if that is the order of triangulated() anyway.
@@ -64,8 +66,7 @@ struct ReadOptions {
 /// ASCII PLY file, unknown lines of a PLY header, an OFF file without its keyword or with the count joined to
 /// it, unused points that are not finite (left out), zeros or Ctrl-Z behind the data. Without a note: byte
 /// order marks, line ends of any system, blanks, comments, `end solid`, triangle strips, binary OFF of either
-/// byte order. Parts of a scene that cannot be read as shown (lines, skins, morph targets) and a unit other
-/// than the millimetre in 3MF are noted, too.
+/// byte order. Parts of a scene that cannot be read as shown (lines, skins, morph targets) are noted, too.
 /// @throws Error that names the file if it is missing, empty, truncated, of an unknown or wrong type, longer
 /// than it declares, or has an index out of range, a coordinate of a polygon that is not finite, or no
 /// polygon.
@@ -90,15 +91,18 @@ PolygonMesh read_mesh(const std::filesystem::path& path, RunContext& context,
 /// double. Reading the file back gives the same double positions, and the same PolygonMesh bit for bit if the
 /// sums origin + point are exact in double precision: always if the origin is 0, and as long as a point's
 /// last bit is at least 2^-52 of its distance from 0. PLY stores the attributes of points and of polygons,
-/// colours as bytes, and "uv" of corners; the other formats store none. STL, glTF and 3MF cut quads into
+/// colours as bytes, and "uv" of corners; OBJ stores "colour" and "normal" of points, "uv" and the names of
+/// "material"; a note lists those that are left out. STL, glTF and 3MF cut quads into
 /// triangles.
+/// @param metres length in metres of the unit of the coordinates; 0 if it is unknown. A 3MF file states the
+///   unit, or millimetres if it is unknown or none of the format's; a glTF file is in metres. Where the unit
+///   differs, the placement of the part scales it, so that no coordinate is rounded.
 /// @throws Error for an unknown extension, a path that cannot be written, or a mesh of more than 4 GB in
 /// .glb.
-void write_mesh(const std::filesystem::path& path, const PolygonMesh& mesh, RunContext& context);
-/// Writes a mesh as above, but states in a 3MF file that its coordinates are metres. write_mesh() does not
-/// know their unit and states millimetres. A glTF file is always in metres, and the other formats state no
-/// unit.
-void write_mesh_in_metres(const std::filesystem::path& path, const PolygonMesh& mesh, RunContext& context);
+void write_mesh(const std::filesystem::path& path, const PolygonMesh& mesh, RunContext& context,
+                double metres = 0.0);
+/// Returns true if files of this format state the unit of their coordinates.
+bool states_unit(const std::filesystem::path& path);
 
 /// Returns true if the path ends in one of kMeshEndings, in letters of either case.
 bool is_mesh_path(const std::filesystem::path& path);

@@ -216,17 +216,96 @@ void write_ply(Output& out, const MeshFile& mesh, const PlyAttributes& attribute
 // Text is read in double precision, so points are written as doubles: the few digits that identify a float
 // are another double.
 
-void write_obj(Output& out, const MeshFile& mesh) {
+/// The attributes that OBJ stores; null where the mesh has none.
+struct ObjAttributes {
+  const MeshAttribute *colour = nullptr, *normal = nullptr, *uv = nullptr, *material = nullptr;
+};
+
+ObjAttributes obj_attributes(const MeshFile& mesh, const std::string& file, RunContext& context) {
+  ObjAttributes result;
+  std::string lost;
+  for (const MeshAttribute& attribute : mesh.attributes) {
+    const auto is = [&](const char* name, AttributeDomain domain, int components, std::size_t kind) {
+      return attribute.name == name && attribute.domain == domain && attribute.components == components &&
+             attribute.values.index() == kind;
+    };
+    if (is("colour", AttributeDomain::point, 3, 0))
+      result.colour = &attribute;
+    else if (is("normal", AttributeDomain::point, 3, 0))
+      result.normal = &attribute;
+    else if (is("uv", AttributeDomain::point, 2, 0) || is("uv", AttributeDomain::corner, 2, 0))
+      result.uv = &attribute;
+    else if (is("material", AttributeDomain::polygon, 1, 1) && !attribute.labels.empty())
+      result.material = &attribute;
+    else
+      lost += (lost.empty() ? "" : ", ") + attribute.name;
+  }
+  if (!lost.empty())
+    context.note(
+        joined(in_quotes(file), ": an OBJ cannot store these attributes, which were left out: ", lost));
+  return result;
+}
+
+void write_obj(Output& out, const MeshFile& mesh, const ObjAttributes& attributes) {
   if (mesh.origin) write_numbers(out, "# origin", *mesh.origin);
-  for (const Eigen::Vector3d& point : mesh.points) write_numbers(out, "v", point);
+  const auto values = [](const MeshAttribute* attribute) -> const float* {
+    return attribute ? std::get<0>(attribute->values).data() : nullptr;
+  };
+  const auto lines = [&](std::string_view lead, const float* from, std::size_t elements, std::size_t n) {
+    for (std::size_t i = 0; from && i < elements; ++i) {
+      out.text(lead);
+      for (std::size_t k = 0; k < n; ++k) out.text(" "), out.text(NumberText(from[n * i + k]));
+      out.text("\n");
+    }
+  };
+  const float* colour = values(attributes.colour);
+  for (std::size_t i = 0; i < mesh.points.size(); ++i) {
+    if (!colour) {
+      write_numbers(out, "v", mesh.points[i]);
+      continue;
+    }
+    out.text("v");
+    for (const double x : mesh.points[i]) out.text(" "), out.text(NumberText(x));
+    for (std::size_t k = 0; k < 3; ++k) out.text(" "), out.text(NumberText(colour[3 * i + k]));
+    out.text("\n");
+  }
+  const bool uv_of_corners = attributes.uv && attributes.uv->domain == AttributeDomain::corner;
+  if (attributes.uv) lines("vt", values(attributes.uv), std::get<0>(attributes.uv->values).size() / 2, 2);
+  lines("vn", values(attributes.normal), mesh.points.size(), 3);
+  std::size_t number = 0, corners = 0;
+  std::int32_t material = -2;
   for_each_polygon(mesh, [&](const auto& polygon) {
+    if (attributes.material) {
+      const std::int32_t own = std::get<1>(attributes.material->values)[number];
+      const std::vector<std::string>& labels = attributes.material->labels;
+      if (own != material)
+        out.text(
+            "usemtl " +
+            (own >= 0 && std::size_t(own) < labels.size() ? labels[std::size_t(own)] : std::string("none")) +
+            "\n");
+      material = own;
+    }
+    ++number;
     out.text("f");
     for (const std::uint32_t corner : polygon) {
+      // OBJ counts from 1.
       out.text(" ");
-      out.text(NumberText(std::uint64_t(corner) + 1));  // OBJ counts from 1
+      out.text(NumberText(std::uint64_t(corner) + 1));
+      ++corners;
+      if (attributes.uv || attributes.normal) out.text("/");
+      if (attributes.uv) out.text(NumberText(uv_of_corners ? corners : std::uint64_t(corner) + 1));
+      if (attributes.normal) out.text("/"), out.text(NumberText(std::uint64_t(corner) + 1));
     }
     out.text("\n");
   });
+}
+
+/// Adds a note about the attributes of a mesh whose format stores none.
+void note_lost_attributes(const MeshFile& mesh, const std::string& file, RunContext& context) {
+  std::string lost;
+  for (const MeshAttribute& attribute : mesh.attributes) lost += (lost.empty() ? "" : ", ") + attribute.name;
+  if (!lost.empty())
+    context.note(joined(in_quotes(file), ": only PLY and OBJ store attributes; these were left out: ", lost));
 }
 
 void write_off(Output& out, const MeshFile& mesh) {
@@ -302,9 +381,16 @@ void write_stl(Output& out, const MeshFile& mesh) {
       mesh, [&](auto... corners) { write_stl_triangle(out, {rounded_to_single(mesh.points[corners])...}); });
 }
 
-/// Writes a mesh; `unit` is 3MF's word for the unit of its coordinates.
-void write_in_unit(const std::filesystem::path& path, const PolygonMesh& mesh, std::string_view unit,
-                   RunContext& context) {
+}  // namespace
+
+bool states_unit(const std::filesystem::path& path) {
+  const std::optional<MeshPath> named = parse_mesh_path(path);
+  return named &&
+         (named->format == Format::glb || named->format == Format::gltf || named->format == Format::three_mf);
+}
+
+void write_mesh(const std::filesystem::path& path, const PolygonMesh& mesh, RunContext& context,
+                double metres) {
   const Stage stage(context, "write");
   const std::string name = path.string();
   const std::optional<MeshPath> named = parse_mesh_path(path);
@@ -315,6 +401,7 @@ void write_in_unit(const std::filesystem::path& path, const PolygonMesh& mesh, s
     if (!file.points[i].allFinite())
       throw Error(joined("cannot write ", in_quotes(name), ": point ", i, " is not finite"));
   if (named->format == Format::stl) note_losses_of_stl(name, file, context);
+  if (named->format != Format::ply && named->format != Format::obj) note_lost_attributes(file, name, context);
   // In this order, so that an Error closes the stream before it removes the file.
   AtomicFile temporary(path);
   Output out(temporary.path(), path, named->gzipped, context);
@@ -324,7 +411,7 @@ void write_in_unit(const std::filesystem::path& path, const PolygonMesh& mesh, s
       write_ply(out, file, ply_attributes(file, name, context));
       break;
     case Format::obj:
-      write_obj(out, file);
+      write_obj(out, file, obj_attributes(file, name, context));
       break;
     case Format::off:
       write_off(out, file);
@@ -334,24 +421,14 @@ void write_in_unit(const std::filesystem::path& path, const PolygonMesh& mesh, s
       break;
     case Format::glb:
     case Format::gltf:
-      write_gltf(sink, mesh, named->format == Format::glb, name);
+      write_gltf(sink, mesh, named->format == Format::glb, name, metres > 0.0 ? metres : 1.0);
       break;
     case Format::three_mf:
-      write_three_mf(sink, mesh, unit, name, context);
+      write_three_mf(sink, mesh, metres, name, context);
       break;
   }
   out.close();
   temporary.commit();
-}
-
-}  // namespace
-
-void write_mesh(const std::filesystem::path& path, const PolygonMesh& mesh, RunContext& context) {
-  write_in_unit(path, mesh, "millimeter", context);
-}
-
-void write_mesh_in_metres(const std::filesystem::path& path, const PolygonMesh& mesh, RunContext& context) {
-  write_in_unit(path, mesh, "meter", context);
 }
 
 }  // namespace hermesh

@@ -1,14 +1,18 @@
 #include "algorithms/remesh/remesh.h"
 
+#include <algorithm>
+#include <cmath>
 #include <cstdint>
 #include <vector>
 
 #include "algorithms/core/disjoint_sets.h"
+#include "algorithms/core/number_text.h"
 #include "algorithms/core/run_context.h"
 #include "algorithms/extraction/adaptivity_field.h"
 #include "algorithms/extraction/explain.h"
 #include "algorithms/io/written_precision.h"
 #include "algorithms/lattice/memory_estimate.h"
+#include "algorithms/search/transfer_attributes.h"
 #include "algorithms/voxelization/outputs/lost_surface.h"
 
 namespace hermesh {
@@ -27,6 +31,68 @@ std::size_t count_components(const PolygonMesh& mesh) {
   std::size_t count = 0;
   for (std::uint32_t i = 0; i < sets.size(); ++i) count += used[i] && sets.find(i) == i;
   return count;
+}
+
+/// Adds a note if the coordinates of polygons have been rounded to single precision far from the origin: if
+/// all are multiples of its step there, some odd ones, and that is coarser than a twentieth of a voxel.
+void note_rounded_coordinates(const PolygonMesh& mesh, double voxel_size, RunContext& context) {
+  constexpr double kShare = 0.05;
+  const Bounds box = bounds(mesh);
+  double coarsest = 0.0, there = 0.0;
+  for (int axis = 0; axis < 3; ++axis) {
+    const double largest = std::max(std::abs(box.lower[axis]), std::abs(box.upper[axis]));
+    const double step = largest > 0.0 ? std::ldexp(1.0, std::ilogb(largest) - 23) : 0.0;
+    if (!(step > kShare * voxel_size) || step <= coarsest) continue;
+    bool is_rounded = true, is_odd = false;
+    for (std::size_t p = 0; p < mesh.points.size() && is_rounded; ++p) {
+      const double steps = mesh.world(p)[axis] / step;
+      is_rounded = steps == std::round(steps);
+      is_odd = is_odd || std::fmod(steps, 2.0) != 0.0;
+    }
+    if (is_rounded && is_odd) coarsest = step, there = largest;
+  }
+  if (coarsest > 0.0)
+    context.note(
+        "coordinates as large as " + text(there) + " are stored in single precision, in steps of " +
+        text(coarsest) + ", which is " + text(coarsest / voxel_size) +
+        " voxel: the shape was rounded before it was read; subtract an offset before single precision "
+        "is used, or store doubles");
+}
+
+/// Converts the offset of polygons to a mesh. Where polygons do not bound their solid, distances are those to
+/// the solid's mesh.
+Remeshed remesh_offset(const PolygonMesh& mesh, const VoxelizeRecipe& voxelizing, ExtractRecipe recipe,
+                       RunContext& context) {
+  const Offset& offset = *voxelizing.offset;
+  Remeshed made;
+  PolygonMesh boundary;
+  const PolygonMesh* source = &mesh;
+  LevelSet level_set;
+  if (offset.kind == Offset::Kind::solid) {
+    VoxelizeRecipe plain = voxelizing;
+    plain.thin = ThinRule::keep;  // without the note on lost parts, of which an offset loses none
+    level_set = make_level_set(mesh, plain, context).level_set;
+    if (!bound_their_solid(mesh, level_set, context)) {
+      ExtractRecipe whole = recipe;
+      whole.out.clear();
+      boundary = extract_surface(level_set, &mesh, whole, context);
+      // Polygons within the solid are not nearest to a position outside.
+      if (offset.distance > 0.0) boundary = joined(boundary, mesh);
+      source = &boundary;
+    }
+  }
+  made.voxel_size = voxel_size_of(voxelizing, mesh);
+  Stopwatch watch;
+  const SampledSolid solid = offset_solid(*source, level_set, made.voxel_size, offset, context);
+  made.seconds = watch.seconds();
+  made.voxels = solid.level_set.active_voxels();
+  recipe.hermite = &solid.hermite;
+  recipe.ends.reset();
+  Stopwatch extraction;
+  made.mesh = extract_surface(solid.level_set, nullptr, recipe, context);
+  made.extract_seconds = extraction.seconds();
+  made.offset = offset_errors(*source, solid.hermite, made.mesh, offset.radius(), context);
+  return made;
 }
 
 }  // namespace
@@ -75,6 +141,7 @@ MadeLevelSet make_level_set(const PolygonMesh& mesh, const VoxelizeRecipe& recip
   MadeLevelSet made;
   made.voxel_size = voxel_size_of(recipe, mesh);
   check_voxelization_fits(mesh, made.voxel_size, recipe.exterior_band, recipe.interior_band);
+  note_rounded_coordinates(mesh, made.voxel_size, context);
   Stopwatch watch;
   made.level_set = voxelize(mesh, recipe, context);
   context.check();
@@ -125,6 +192,7 @@ PolygonMesh extract_surface(const LevelSet& volume, const PolygonMesh* source, c
 
 Remeshed remesh(const PolygonMesh& mesh, const VoxelizeRecipe& voxelizing, const ExtractRecipe& extracting,
                 RunContext& context) {
+  if (voxelizing.offset) return remesh_offset(mesh, voxelizing, extracting, context);
   ExtractRecipe recipe = extracting;
   const PolygonMesh* source = &mesh;
   MadeSolid solid;

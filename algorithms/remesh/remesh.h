@@ -10,6 +10,7 @@
 
 #include "algorithms/core/variant.h"
 #include "algorithms/extraction/volume_ends.h"
+#include "algorithms/remesh/offset_solid.h"
 #include "algorithms/remesh/thin_parts.h"
 
 namespace hermesh {
@@ -39,6 +40,7 @@ struct VoxelizeRecipe {
   double exterior_band = 3.0;             ///< voxels
   double interior_band = 3.0;             ///< voxels
   ThinRule thin = ThinRule::drop;         ///< of make_solid() and remesh()
+  std::optional<Offset> offset = {};      ///< of remesh(), where thin parts need no rule then
 };
 
 /// Parameters of an extraction.
@@ -101,7 +103,8 @@ PolygonMesh extract_surface(const LevelSet& volume, const PolygonMesh* source, c
 
 struct Remeshed : VoxelizationFacts {
   PolygonMesh mesh;
-  std::optional<ThinParts> thin;  ///< none if no part was thickened
+  std::optional<ThinParts> thin;       ///< none if no part was thickened
+  std::optional<OffsetErrors> offset;  ///< of the mesh, if the recipe has an offset
   double extract_seconds = 0.0;
 };
 /// Converts polygons to a level set and back to a mesh. Notes state thickened or lost thin parts, and that

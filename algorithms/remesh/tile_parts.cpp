@@ -12,13 +12,13 @@
 namespace hermesh {
 namespace {
 
-constexpr char kTilesWord[16] = "hermesh tiles 1";
+constexpr char kTilesWord[16] = "hermesh tiles 2";
 static_assert(std::endian::native == std::endian::little);
 
 /// Applies f to all members of a part that its file stores, in their order.
 template <class Part, class F>
 void for_each_stored(Part& part, F&& f) {
-  f(part.task), f(part.job.number), f(part.job.count), f(part.written_in_single), f(part.in_metres);
+  f(part.task), f(part.job.number), f(part.job.count), f(part.written_in_single), f(part.metres);
   for (int a = 0; a < 3; ++a) f(part.origin[a]);
 }
 template <class Tile, class F>

@@ -21,7 +21,7 @@ struct TilePart {
   TileJob job;
   Eigen::Vector3d origin = Eigen::Vector3d::Zero();  ///< of the mesh, world units
   bool written_in_single = false;  ///< the vertices are proved for files of single precision
-  bool in_metres = false;          ///< the world's unit is the metre
+  double metres = 0.0;             ///< length of the world's unit; 0 if unknown
   std::vector<TileMesh> tiles;     ///< those with vertices, ascending
 };
 

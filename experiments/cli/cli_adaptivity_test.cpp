@@ -69,8 +69,7 @@ TEST_F(AdaptivityTest, BadInputIsSaidInASentence) {
   expect_refused({"--frustum", "0,0,3 0,0,0 x 1 0.1 9"}, 2, "not a number");
   expect_refused({"--frustum", "0,0,3 0,0,0 190 1 0.1 9"}, 2, "--frustum");
   expect_refused({"--frustum", "0,0,3 0,0,0 60 1 0.1 9", "--mask", "sphere.vdb"}, 2, "--mask");
-  expect_refused({"--frustum", "50,0,3 60,0,0 20 1 0.1 9", "--outside", "nothing"}, 1,
-                 "the mask");
+  expect_refused({"--frustum", "50,0,3 60,0,0 20 1 0.1 9", "--outside", "nothing"}, 1, "the mask");
   run_to(2, "extract sphere.vdb out.ply --extractor marching-cubes --mask sphere.vdb");
 }
 

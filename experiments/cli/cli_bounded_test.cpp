@@ -27,12 +27,12 @@ TEST_F(CliBoundedTest, TheJudgeFindsTheErrorKept) {
 
 TEST_F(CliBoundedTest, UnitsSayWhatTheNumbersAre) {
   write_cube();
-  // With units the world is in metres.
   EXPECT_NEAR(json_of("remesh cube.off out.ply --error 1mm --units inch --json")
                   .at("figures")
                   .at("error_asked")
                   .get<double>(),
-              0.001, 1e-9);
+              1.0 / 25.4, 1e-9);
+  expect_refusal(2, "remesh cube.off out.ply --error 1mm", {"--units"}, true);
 }
 
 TEST_F(CliBoundedTest, ABudgetIsKept) {

@@ -134,5 +134,65 @@ TEST_F(RightAnswersTest, FractureKeepsTheVolumeAtAnyTolerance) {
   EXPECT_NEAR(volume("1"), finest, 0.01 * finest);
 }
 
+TEST_F(RightAnswersTest, InchesStayInches) {
+  // 1 × 0.5 × 0.25 inches.
+  run_to(0, {"remesh", input("f01_inch.3mf"), "out.3mf", "--resolution", "40"});
+  EXPECT_NEAR(json_of("validate out.3mf --json")["volume"].get<double>(), 0.125, 1e-4);
+  EXPECT_NEAR(json_of("validate out.3mf --units mm --json")["volume"].get<double>(), 2048.0, 2.0);
+  const Json part = remesh("f01_inch.3mf", "--error 0.1mm --units mm");
+  EXPECT_NEAR(part["mesh"]["volume"].get<double>(), 2048.4, 0.1);
+  // A format without units gets a note.
+  EXPECT_PRED2(has, remesh("f01_inch.3mf", "--resolution 40")["notes"].dump(), "inch");
+}
+
+TEST_F(RightAnswersTest, CoordinatesThatWereRoundedFarAwayAreNoted) {
+  // A box of 0.4 × 0.3 × 0.2 at UTM coordinates in single precision, in steps of 0.5.
+  const Outcome outcome = run({"remesh", input("t49_utm.stl"), "out.ply", "--voxel-size", "0.05"});
+  EXPECT_PRED2(has, outcome.err, "single precision") << outcome.err;
+  EXPECT_PRED2(has, outcome.err, "0.5") << outcome.err;
+}
+
+TEST_F(RightAnswersTest, ColoursAreTransferredOrNoted) {
+  // Red above, blue below.
+  const Json made = remesh("t50_two_colours.ply", "--resolution 20");
+  EXPECT_EQ(made["result"]["attributes"], Json({"colour"}));
+  run_to(0, "remesh out.ply coloured.obj --resolution 20");
+  std::istringstream lines(read("coloured.obj"));
+  for (std::string word, line; std::getline(lines, line);) {
+    std::istringstream words(line);
+    double x, y, z, red, green, blue;
+    if (!(words >> word) || word != "v") continue;
+    ASSERT_TRUE(words >> x >> y >> z >> red >> green >> blue) << line;
+    EXPECT_NEAR(red + blue, 1.0, 0.02) << line;
+  }
+  const Outcome lost = run({"remesh", input("t50_two_colours.ply"), "out.stl", "--resolution", "20"});
+  EXPECT_PRED2(has, lost.err, "colour") << lost.err;
+  const Outcome dropped =
+      run({"remesh", input("t50_two_colours.ply"), "out.stl", "--resolution", "20", "--attributes", "none"});
+  EXPECT_PRED2(lacks, dropped.err, "colour") << dropped.err;
+}
+
+TEST_F(RightAnswersTest, AMaskThatFillsItsImageIsClosedAtItsEnd) {
+  run_to(0, {"import", input("v22_full.nii.gz"), "full.vdb"});
+  run_to(0, "extract full.vdb full.ply --isovalue 0.5");
+  EXPECT_NEAR(json_of("validate full.ply --require watertight --json")["volume"].get<double>(), 840.0, 1e-3);
+}
+
+TEST_F(RightAnswersTest, AHeightFieldIsASolidIfThatIsRequested) {
+  // The same hill facing up and down: with a base it is the solid below it, and as a shell a wall.
+  const double up = remesh("t41v_hill.obj", "--fill-below=-1 --resolution 80")["mesh"]["volume"];
+  const double down = remesh("t41v_hill_down.obj", "--fill-below=-1 --resolution 80")["mesh"]["volume"];
+  EXPECT_NEAR(up, down, 1e-9 * up);
+  EXPECT_GT(up, 400.0) << "20 × 20 × 1 below the hill";
+  for (const char* name : {"t41v_hill.obj", "t41v_hill_down.obj"}) {
+    const Json shell = remesh(name, "--shell 1 --voxel-size 0.2");
+    EXPECT_LT(shell["result"]["offset"]["largest_above"].get<double>(), 0.04);
+    EXPECT_LT(shell["result"]["offset"]["largest_below"].get<double>(), 0.04);
+    EXPECT_EQ(shell["mesh"]["components"], 1);
+  }
+  expect_refusal(1, Words{"remesh", input("t41v_hill.obj"), "out.ply", "--fill-below=3"}, {"base"}, true);
+  expect_refusal(2, Words{"remesh", input("t41v_hill.obj"), "out.ply", "--shell=-1"}, {"--shell"}, true);
+}
+
 }  // namespace cli_right_answers_test
 }  // namespace hermesh::cli

@@ -3,6 +3,7 @@
 #include <pty.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <thread>
 
@@ -119,24 +120,34 @@ TEST_F(SurroundingsTest, AnObjectSmallerThanAVoxelIsRefusedWhereverItLies) {
     for (const Words arguments :
          {"remesh box.off out.ply", "voxelize box.off out.vdb", "fracture box.off out --cutters voronoi:2",
           "combine union box.off box.off out.ply"})
-      expect_refusal(1, arguments + "--units mm --voxel-size 0.2", {"box.off"}, true);
+      expect_refusal(1, arguments + "--units mm --voxel-size 200", {"box.off"}, true);
   }
-  run_to(0, "remesh box.off out.ply --units mm --voxel-size 0.0002");
+  run_to(0, "remesh box.off out.ply --units mm --voxel-size 0.2");
 }
 
-TEST_F(SurroundingsTest, UnitsAreStatedWhereTheFormatHasThem) {
+/// The same box of 2 × 3 × 4 mm through all pairs of formats, the first of which may state a unit.
+TEST_F(SurroundingsTest, TheSizeIsPreservedInAllFormats) {
+  const std::vector<std::string> endings = {"ply", "obj", "off", "stl", "glb", "gltf", "3mf"};
   write("box.off", small_box(0.0));
-  for (const Words command : {"remesh box.off", "combine union box.off box.off"}) {
-    run_to(0, command + "out.3mf --resolution 20 --units mm");
-    const Json report = json_of("validate out.3mf --json");
-    // The reader uses the numbers unchanged, and notes a unit other than the millimetre.
-    EXPECT_NEAR(report.at("volume").get<double>(), 24e-9, 1e-11);
-    EXPECT_PRED2(has, report.at("notes").dump(), "'meter'") << report.at("notes");
+  const auto volume = [&](const std::string& file) {
+    return json_of("validate " + file + " --units mm --json").at("volume").get<double>();
+  };
+  for (const std::string& first : endings) {
+    run_to(0, "remesh box.off a." + first + " --resolution 20 --units mm");
+    EXPECT_NEAR(volume("a." + first), 24.0, 1e-3) << first;
+    for (const std::string& second : endings) {
+      run_to(0, "remesh a." + first + " b." + second + " --voxel-size 0.4 --units mm");
+      EXPECT_NEAR(volume("b." + second), 24.0, 1e-3) << first << " to " << second;
+    }
   }
-  run_to(0, "remesh box.off out.3mf --resolution 20");
-  const Json report = json_of("validate out.3mf --json");
-  EXPECT_NEAR(report.at("volume").get<double>(), 24.0, 0.01);
-  EXPECT_TRUE(report.at("notes").empty()) << report.at("notes");
+  // A glTF file is in metres, whatever the units of the other files are.
+  EXPECT_NEAR(json_of("validate a.glb --json").at("volume").get<double>(), 24e-9, 1e-12);
+  run_to(0, "remesh a.glb c.3mf --resolution 20");
+  EXPECT_NEAR(volume("c.3mf"), 24.0, 1e-3);
+  EXPECT_NEAR(json_of("validate c.3mf --json").at("volume").get<double>(), 24e-9, 1e-12);
+  // Without a known unit numbers are unchanged; 3MF is in millimetres.
+  run_to(0, "remesh box.off d.3mf --resolution 20");
+  EXPECT_NEAR(json_of("validate d.3mf --json").at("volume").get<double>(), 24.0, 1e-3);
 }
 
 TEST_F(SurroundingsTest, WholeNumbersHaveAnyNotation) {
@@ -184,6 +195,22 @@ TEST(TerminalProgressTest, IsNeverSilent) {
   int lines = 0;
   for (std::size_t at = 0; (at = sent.find("work  25 %", at)) != std::string::npos; ++at) ++lines;
   EXPECT_GE(lines, 2) << sent;
+}
+
+TEST(TerminalProgressTest, WritesLinesWhereNoTerminalIs) {
+  testing::internal::CaptureStderr();
+  {
+    RunContext context;
+    const TerminalProgress progress(context, true, {}, std::chrono::milliseconds(100));
+    context.progress("work", 0.25);
+    std::this_thread::sleep_for(std::chrono::milliseconds(1000));
+  }
+  const std::string sent = testing::internal::GetCapturedStderr();
+  EXPECT_NE(sent.find("hermesh: working for 1 s, work  25 %\n"), std::string::npos) << sent;
+  // After 100, 200, 400 and 800 ms, fewer on a loaded machine.
+  const auto lines = std::count(sent.begin(), sent.end(), '\n');
+  EXPECT_GE(lines, 2) << sent;
+  EXPECT_LE(lines, 4) << sent;
 }
 
 }  // namespace cli_surroundings_test

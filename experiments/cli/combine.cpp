@@ -4,6 +4,7 @@
 
 #include "algorithms/core/run_context.h"
 #include "algorithms/hermite/solids.h"
+#include "algorithms/search/transfer_attributes.h"
 #include "experiments/cli/cli11.h"
 #include "experiments/cli/conversions.h"
 #include "experiments/cli/signals.h"
@@ -16,6 +17,7 @@ struct CombineArguments {
   std::string first, second, out;
   VoxelizeArguments voxelizing;
   ExtractorArguments extracting;
+  std::string attributes;  ///< "none", or all
   bool judge = false;
 };
 
@@ -74,8 +76,9 @@ int run_combine(CombineArguments& arguments, Session& session) {
     throw UsageError("--signs unsigned leaves the solids without an inside to combine");
   arguments.extracting.choose();
   check_mesh_output(arguments.out);
-  const PolygonMesh first = read_polygons(arguments.first, session);
-  const PolygonMesh second = read_polygons(arguments.second, session);
+  const ReadOptions reading{.attributes = arguments.attributes != "none"};
+  const PolygonMesh first = read_polygons(arguments.first, session, reading);
+  const PolygonMesh second = read_polygons(arguments.second, session, reading);
   // A resolution counts along the longer operand, so the order of the two does not matter.
   const bool second_is_longer = bounds(second).size().maxCoeff() > bounds(first).size().maxCoeff();
   voxelizing.voxel_size = second_is_longer ? voxelizing.recipe(second, arguments.second).voxel_size
@@ -100,7 +103,10 @@ int run_combine(CombineArguments& arguments, Session& session) {
   made(session, "crossings", result.hermite.crossings.size());
   print_summary(session, "combined to " + std::to_string(result.hermite.crossings.size()) +
                              " edge crossings, " + seconds_text(watch.seconds()));
-  write_output(arguments.out, contour(result, arguments, session), session);
+  PolygonMesh mesh = contour(result, arguments, session);
+  if (!first.attributes.empty() || !second.attributes.empty())
+    carry_attributes(joined(first, second), mesh, session);
+  write_output(arguments.out, mesh, session);
   const bool holds = !arguments.judge ||
                      guarantees_hold(arguments.out, arguments.extracting.chosen.extractor.promises, session);
   work_is_finished();
@@ -127,6 +133,7 @@ void add_combine(CLI::App& app, Session& session) {
   add_voxelize_options(*command, arguments->voxelizing);
   command->get_option("--resolution")->description("Voxels along the longest side of the larger solid");
   add_extractor_options(*command, arguments->extracting, "manifold-dual-contouring");
+  add_attributes_option(*command, arguments->attributes);
   command->add_flag(
       "--judge", arguments->judge,
       "Read the file back and validate the guarantees of the extractor; exit code 3 on failure");

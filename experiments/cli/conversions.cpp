@@ -5,6 +5,7 @@
 #include "algorithms/core/quad_diagonals.h"
 #include "algorithms/core/run_context.h"
 #include "algorithms/io/mesh_file.h"
+#include "algorithms/search/transfer_attributes.h"
 #include "experiments/cli/cli11.h"
 #include "experiments/cli/help.h"
 #include "experiments/variants.h"
@@ -65,8 +66,7 @@ VoxelizeRecipe VoxelizeArguments::recipe(const PolygonMesh& mesh, const std::str
   const double longest_side = bounds(mesh).size().maxCoeff();
   if (voxel_size && *voxel_size > longest_side && !any_size)
     throw Error("'" + file + "' is smaller than a voxel: its longest side is " + text(longest_side) +
-                " and --voxel-size is " + text(*voxel_size) +
-                " (world units, metres if --units is given); use smaller voxels");
+                " and --voxel-size is " + text(*voxel_size) + " world units; use smaller voxels");
   if (!voxel_size && !(longest_side > 0.0))
     throw Error("'" + file + "' has no extent, so --resolution gives no voxel size; use --voxel-size");
   return {.chosen = chosen,
@@ -106,8 +106,9 @@ CLI::App* add_voxelize_options(CLI::App& command, VoxelizeArguments& arguments, 
                      "Name of the voxelizer, see hermesh list (default: " + arguments.voxelizer + ")");
   command.add_option(
       "--signs", arguments.signs,
-      "How the voxelizer hermesh finds the inside: auto (default), flood-fill, winding-number, "
-      "or unsigned for none; short for --voxelizer-option signs=...");
+      "How the voxelizer hermesh finds the inside: auto (default), flood-fill, winding-number (default of "
+      "remesh --error and --triangles), or unsigned for none; with --thin keep the default is auto-sheets, "
+      "i.e. auto without closing large holes; short for --voxelizer-option signs=...");
   command
       .add_option("--thin", arguments.thin,
                   "Walls, wires and open sheets thinner than the voxels: keep (default) thickens them until "
@@ -145,12 +146,20 @@ void add_extractor_options(CLI::App& command, ExtractorArguments& arguments, con
       });
 }
 
-PolygonMesh polygons_of(MeshFile&& file, const std::string& path, const Session& session) {
-  if (session.scale != 1.0) {
-    // In double precision, so that each point is rounded once.
-    for (Eigen::Vector3d& point : file.points) point *= session.scale;
-    if (file.origin) *file.origin *= session.scale;
-  }
+void to_world_units(MeshFile& file, Session& session) {
+  double scale = session.scale;
+  if (file.metres > 0.0 && session.metres > 0.0)
+    scale *= file.metres / session.metres;
+  else if (file.metres > 0.0)
+    session.metres = file.metres;
+  if (scale == 1.0) return;
+  // In double precision, so that each point is rounded once.
+  for (Eigen::Vector3d& point : file.points) point *= scale;
+  if (file.origin) *file.origin *= scale;
+}
+
+PolygonMesh polygons_of(MeshFile&& file, const std::string& path, Session& session) {
+  to_world_units(file, session);
   PolygonMesh mesh = about_file(path, [&] { return to_polygon_mesh(std::move(file)); });
   choose_diagonals(mesh);
   return mesh;
@@ -176,8 +185,9 @@ void print_voxelized(Session& session, const std::string& file, const PolygonMes
   made(session, "voxel_size", facts.voxel_size);
   made(session, "voxelizer", voxelizer);
   print_summary(session, "voxelized " + file + ": " + std::to_string(mesh.triangle_count()) + " triangles, " +
-                             std::to_string(facts.voxels) + " voxels of " + text(facts.voxel_size) + ", " +
-                             voxelizer + ", " + seconds_text(facts.seconds));
+                             std::to_string(facts.voxels) + " voxels of " +
+                             length_text(session, facts.voxel_size) + ", " + voxelizer + ", " +
+                             seconds_text(facts.seconds));
 }
 
 void print_extracted(Session& session, const PolygonMesh& mesh, const std::string& extractor,
@@ -200,8 +210,30 @@ void report_thin_parts(const std::optional<ThinParts>& thin, Session& session) {
   made(session, "merged_share", parts.merged_area / parts.area);
 }
 
+void add_attributes_option(CLI::App& command, std::string& attributes) {
+  command
+      .add_option("--attributes", attributes,
+                  "Colours, normals, texture coordinates, materials and other values of the polygons: all "
+                  "(default) transfers those that OUT can store, none drops them")
+      ->check(CLI::IsMember({"all", "none"}));
+}
+
+void carry_attributes(const PolygonMesh& polygons, PolygonMesh& mesh, Session& session) {
+  if (polygons.attributes.empty()) return;
+  // Distances are compared only, so their scale matters for precision alone.
+  const double scale = bounds(polygons).size().maxCoeff() / 1000.0;
+  SourceAttributes(polygons, scale > 0.0 ? scale : 1.0).add_to(mesh, session.context);
+  Json names = Json::array();
+  for (const MeshAttribute& attribute : mesh.attributes) names.push_back(attribute.name);
+  made(session, "attributes", names);
+}
+
 void write_output(const std::string& path, const PolygonMesh& mesh, Session& session) {
-  (session.units.empty() ? write_mesh : write_mesh_in_metres)(path, mesh, session.context);
+  constexpr double kMillimetre = 0.001;
+  if (session.units.empty() && session.metres > 0.0 && session.metres != kMillimetre && !states_unit(path))
+    session.context.note("'" + path + "' stores no unit; its coordinates are in " + unit_of(session.metres) +
+                         " as those of the input (--units mm converts them)");
+  write_mesh(path, mesh, session.context, session.metres);
 }
 
 }  // namespace hermesh::cli

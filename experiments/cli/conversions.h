@@ -54,11 +54,14 @@ CLI::App* add_voxelize_options(CLI::App& command, VoxelizeArguments& arguments, 
                                bool with_auto = false);
 void add_extractor_options(CLI::App& command, ExtractorArguments& arguments, const std::string& fallback);
 
-/// Reads a mesh to voxelize, in world units (session.scale), with quads cut along the better diagonal.
+/// Scales the points of a file to world units: by session.scale, and from the unit that the file states to
+/// that of the session, which becomes the file's if it is unknown.
+void to_world_units(MeshFile& file, Session& session);
+/// Reads a mesh to voxelize, in world units, with quads cut along the better diagonal.
 /// @throws Error if it cannot be read.
 PolygonMesh read_polygons(const std::string& path, Session& session, const ReadOptions& options = {});
 /// Returns the polygons of a file that was read from `path`, as read_polygons() does.
-PolygonMesh polygons_of(MeshFile&& file, const std::string& path, const Session& session);
+PolygonMesh polygons_of(MeshFile&& file, const std::string& path, Session& session);
 
 /// Converts polygons to a solid (make_solid()), with a line of summary. @param name of the mesh
 MadeSolid make_solid(const PolygonMesh& mesh, const std::string& name, const VoxelizeArguments& arguments,
@@ -70,10 +73,16 @@ void print_extracted(Session& session, const PolygonMesh& mesh, const std::strin
 /// Adds statistics of thickened parts to the JSON document; they are 0 if no part was thickened.
 void report_thin_parts(const std::optional<ThinParts>& thin, Session& session);
 
+/// Adds --attributes of commands that make meshes from polygons.
+void add_attributes_option(CLI::App& command, std::string& attributes);
+/// Transfers the attributes of polygons to a mesh that was made from them. Linear time.
+void carry_attributes(const PolygonMesh& polygons, PolygonMesh& mesh, Session& session);
+
 /// Adds the command join.
 void add_join(CLI::App& app, Session& session);
 
-/// Writes the mesh, with the unit of its coordinates if --units is given and the format stores one.
+/// Writes the mesh with the unit of its coordinates. Adds a note if the unit of the input is not the
+/// millimetre and the format stores none.
 void write_output(const std::string& path, const PolygonMesh& mesh, Session& session);
 
 }  // namespace hermesh::cli

@@ -15,6 +15,7 @@
 #include "algorithms/io/written_precision.h"
 #include "algorithms/remesh/auto_voxel.h"
 #include "algorithms/remesh/bounded_remesh.h"
+#include "algorithms/remesh/height_field.h"
 #include "algorithms/remesh/tiled_remesh.h"
 #include "experiments/cli/cli11.h"
 #include "experiments/cli/conversions.h"
@@ -26,6 +27,7 @@ namespace hermesh::cli {
 namespace {
 
 constexpr int kDefaultTile = 512;
+constexpr double kShellVoxels = 3.0;  ///< thickness of a shell in voxels, unless a size is given
 
 struct ConvertArguments {
   Paths paths;
@@ -49,6 +51,8 @@ struct ConvertArguments {
   double smallest_voxel = 0.0;  ///< world units; 0: not given
   int tiles = 0;                ///< side of the tiles in voxels; 0: not given
   std::string tile;             ///< "I/N", the job; empty: not given
+  // Solids other than that of the polygons: lengths, with % or a unit behind them; empty: not given.
+  std::string shell, offset, fill_below;
 };
 
 // ---- Adaptivity.
@@ -139,9 +143,11 @@ ExtractRecipe extract_recipe(const ConvertArguments& arguments, const std::optio
           .out = arguments.paths.out};
 }
 
-/// Writes the mesh; a signal that comes later has no effect.
-int save(const ConvertArguments& arguments, const PolygonMesh& mesh, Session& session,
+/// Writes the mesh, with the attributes of the polygons that it was made from, if they have any; a signal
+/// that comes later has no effect.
+int save(const ConvertArguments& arguments, PolygonMesh& mesh, const PolygonMesh& polygons, Session& session,
          int exit_code = kDone) {
+  carry_attributes(polygons, mesh, session);
   write_output(arguments.paths.out, mesh, session);
   work_is_finished();
   return exit_code;
@@ -192,7 +198,39 @@ int run_extract(ConvertArguments& arguments, Session& session) {
       line += " " + name;
     print_summary(session, line);
   }
-  return save(arguments, mesh, session);
+  return save(arguments, mesh, {}, session);
+}
+
+// ---- Lengths.
+
+/// Returns the length that an option gives in world units.
+/// @param text a number, with % or a unit behind it
+/// @param metres length of the world unit; 0 if it is unknown
+/// @param diagonal of the bounding box of the polygons, world units
+/// @throws UsageError
+double length_in_world_units(const std::string& option, const std::string& text, double metres,
+                             double diagonal) {
+  double value = 0.0;
+  const auto [end, failure] = std::from_chars(text.data(), text.data() + text.size(), value);
+  const std::string unit(end, text.data() + text.size());
+  if (failure != std::errc() || !std::isfinite(value))
+    throw UsageError(option + " must be a number such as 0.05, 0.1% or 0.05mm, not '" + text + "'");
+  if (unit.empty()) return value;
+  if (unit == "%") return value / 100.0 * diagonal;
+  const std::optional<double> length = metres_in(unit);
+  if (!length) throw UsageError(option + " '" + text + "' has an unknown unit; see --units");
+  if (!(metres > 0.0))
+    throw UsageError(
+        option + " '" + text +
+        "' has a unit, but the mesh file states none; pass --units with that of the coordinates");
+  return value * (*length / metres);
+}
+
+/// As length_in_world_units(), for lengths greater than 0.
+double positive_length(const std::string& option, const std::string& text, double metres, double diagonal) {
+  const double length = length_in_world_units(option, text, metres, diagonal);
+  if (!(length > 0.0)) throw UsageError(option + " must be greater than 0, not '" + text + "'");
+  return length;
 }
 
 // ---- Remeshing at a voxel size.
@@ -240,6 +278,46 @@ double most_loss(const std::string& text, ThinRule rule) {
   return percent / 100.0;
 }
 
+/// Reads the polygons of remesh, closed below if that is requested.
+PolygonMesh read_input(const ConvertArguments& arguments, Session& session) {
+  PolygonMesh mesh =
+      read_polygons(arguments.paths.in, session, {.attributes = arguments.attributes != "none"});
+  if (arguments.fill_below.empty()) return mesh;
+  const double base =
+      length_in_world_units("--fill-below", arguments.fill_below, session.metres, bounds(mesh).size().norm());
+  return about_file(arguments.paths.in, [&] { return fill_below(mesh, base, session.context); });
+}
+
+/// Returns the offset that is requested, or none. @throws UsageError
+std::optional<Offset> requested_offset(const ConvertArguments& arguments, const PolygonMesh& mesh,
+                                       const Session& session) {
+  const double diagonal = bounds(mesh).size().norm();
+  if (!arguments.shell.empty())
+    return Offset{Offset::Kind::shell, positive_length("--shell", arguments.shell, session.metres, diagonal)};
+  if (!arguments.offset.empty())
+    return Offset{Offset::Kind::solid,
+                  length_in_world_units("--offset", arguments.offset, session.metres, diagonal)};
+  return std::nullopt;
+}
+
+void report_offset(const Offset& offset, const OffsetErrors& errors, double voxel_size, Session& session) {
+  made(session, "offset",
+       {{"distance", offset.distance},
+        {"radius", offset.radius()},
+        {"largest_below", errors.below},
+        {"largest_above", errors.above},
+        {"samples", errors.samples},
+        {"largest_from_offset", errors.from_offset},
+        {"offset_samples", errors.offset_samples}});
+  print_summary(session, "offset: " + std::to_string(errors.samples) + " points of the mesh are " +
+                             text(offset.radius() - errors.below) + " to " +
+                             length_text(session, offset.radius() + errors.above) +
+                             " from the polygons, requested " + length_text(session, offset.radius()) + "; " +
+                             std::to_string(errors.offset_samples) + " points of the offset are within " +
+                             length_text(session, errors.from_offset) + " of the mesh (voxels of " +
+                             length_text(session, voxel_size) + ")");
+}
+
 /// Chooses the voxel size, and prints it with its cost before the work starts.
 void choose_voxel_size(const PolygonMesh& mesh, VoxelizeArguments& voxelizing, Session& session) {
   const AutoVoxelLimits limits;
@@ -255,7 +333,7 @@ void choose_voxel_size(const PolygonMesh& mesh, VoxelizeArguments& voxelizing, S
         {"estimated_bytes", chosen.bytes},
         {"estimated_seconds", chosen.seconds}});
   print_summary(session,
-                "resolution auto: voxels of " + text(chosen.voxel_size) + ", " +
+                "resolution auto: voxels of " + length_text(session, chosen.voxel_size) + ", " +
                     text(std::round(bounds(mesh).size().maxCoeff() / chosen.voxel_size)) +
                     " along the longest side, about " + mebibytes(chosen.bytes) + " and " +
                     text(std::ceil(chosen.seconds)) + " s of CPU time (limits: " + text(limits.most_voxels) +
@@ -275,7 +353,7 @@ void choose_voxel_size(const PolygonMesh& mesh, VoxelizeArguments& voxelizing, S
 TileJob choose_tiles(ConvertArguments& arguments, const CLI::App& command) {
   refuse_idle(command,
               {"--mask", "--frustum", "--frustum-resolution", "--outside", "--tolerance-grid", "--isovalue",
-               "--exterior-band", "--interior-band"},
+               "--exterior-band", "--interior-band", "--shell", "--offset"},
               "it cannot be combined with --tiles and --tile");
   VoxelizeArguments& voxelizing = arguments.voxelizing;
   if (voxelizing.signs.value_or("winding-number") != "winding-number")
@@ -312,7 +390,7 @@ std::optional<Remeshed> remesh_by_tiles(const ConvertArguments& arguments, const
   TilePart part = about_file(in, [&] {
     return remesh_tiles(mesh, recipe, extract_recipe(arguments, std::nullopt), job, session.context);
   });
-  part.in_metres = !session.units.empty();
+  part.metres = session.metres;
   remeshed.seconds = watch.seconds();
   made(session, "polygons", mesh.triangle_count());
   made(session, "voxel_size", remeshed.voxel_size);
@@ -341,6 +419,9 @@ int run_remesh(ConvertArguments& arguments, const CLI::App& command, Session& se
   const bool requested = voxelizing.thin.has_value();
   std::optional<TileJob> job;
   if (arguments.tiles > 0 || !arguments.tile.empty()) job = choose_tiles(arguments, command);
+  if (!arguments.shell.empty() || !arguments.offset.empty())
+    refuse_idle(command, {"--thin", "--max-loss", "--isovalue"},
+                "it cannot be combined with --shell and --offset");
   voxelizing.choose();
   arguments.extracting.choose();
   if (arguments.tile.empty())
@@ -350,11 +431,17 @@ int run_remesh(ConvertArguments& arguments, const CLI::App& command, Session& se
   const ThinRule rule = voxelizing.thin_rule(arguments.isovalue);
   const double max_loss = most_loss(arguments.max_loss, requested ? rule : ThinRule::keep);
   const std::optional<AdaptivityField> field = read_adaptivity(arguments, session);
-  const PolygonMesh mesh = read_polygons(paths.in, session);
-  if (!voxelizing.voxel_size && voxelizing.resolution.value_or(0) == 0)
-    choose_voxel_size(mesh, voxelizing, session);
-  const VoxelizeRecipe recipe = voxelizing.recipe(mesh, paths.in, arguments.isovalue);
-  const std::optional<Remeshed> result =
+  const PolygonMesh mesh = read_input(arguments, session);
+  const std::optional<Offset> offset = requested_offset(arguments, mesh, session);
+  if (!voxelizing.voxel_size && voxelizing.resolution.value_or(0) == 0) {
+    if (offset && offset->kind == Offset::Kind::shell)
+      voxelizing.voxel_size = offset->distance / kShellVoxels;
+    else
+      choose_voxel_size(mesh, voxelizing, session);
+  }
+  VoxelizeRecipe recipe = voxelizing.recipe(mesh, paths.in, arguments.isovalue);
+  recipe.offset = offset;
+  std::optional<Remeshed> result =
       job ? remesh_by_tiles(arguments, mesh, recipe, *job, session) : about_file(paths.in, [&] {
         return std::optional(remesh(mesh, recipe, extract_recipe(arguments, field), session.context));
       });
@@ -362,16 +449,22 @@ int run_remesh(ConvertArguments& arguments, const CLI::App& command, Session& se
     work_is_finished();
     return kDone;
   }
-  const Remeshed& made = *result;
+  Remeshed& made = *result;
   if (!job) print_voxelized(session, paths.in, mesh, made, voxelizing.chosen.voxelizer.name);
-  if (rule != ThinRule::drop) report_thin_parts(made.thin, session);
+  if (rule != ThinRule::drop && !offset) report_thin_parts(made.thin, session);
+  if (made.thin && made.thin->has_open)
+    session.context.note(
+        "open surfaces became as thick as the voxels require; --shell gives them a thickness, and "
+        "--fill-below "
+        "makes the solid below a height field");
   print_extracted(session, made.mesh, arguments.extracting.chosen.extractor.name, made.extract_seconds);
+  if (offset) report_offset(*offset, *made.offset, made.voxel_size, session);
   // Other isovalues, and parts outside a mask, do not show the polygons by intention.
-  const bool is_of_polygons = arguments.isovalue == 0.0 && arguments.mask.empty() &&
+  const bool is_of_polygons = !offset && arguments.isovalue == 0.0 && arguments.mask.empty() &&
                               arguments.frustum.empty() && !voxelizing.chosen.options.is("signs", "unsigned");
   const bool shows =
       !is_of_polygons || check_visible_loss(mesh, made.mesh, made.voxel_size, max_loss, session);
-  return save(arguments, made.mesh, session, shows ? kDone : kNotMet);
+  return save(arguments, made.mesh, mesh, session, shows ? kDone : kNotMet);
 }
 
 // ---- Remeshing within a bound.
@@ -385,26 +478,6 @@ SignRule sign_rule(const VoxelizeArguments& voxelizing) {
       "a bound needs an inside: --signs must be winding-number (the default with --error and --triangles), "
       "flood-fill or auto, not '" +
       rule + "'");
-}
-
-/// Returns the error in world units, which are metres if `units`, those of the file's coordinates, are given.
-/// @param text a number, with % or a unit behind it
-/// @param diagonal of the bounding box of the polygons, world units
-/// @throws UsageError
-double error_in_world_units(const std::string& text, const std::string& units, double diagonal) {
-  double value = 0.0;
-  const auto [end, failure] = std::from_chars(text.data(), text.data() + text.size(), value);
-  const std::string unit(end, text.data() + text.size());
-  if (failure != std::errc() || !std::isfinite(value) || value <= 0.0)
-    throw UsageError("--error must be a number above 0, such as 0.05, 0.1% or 0.05mm, not '" + text + "'");
-  if (unit.empty()) return value;
-  if (unit == "%") return value / 100.0 * diagonal;
-  const std::optional<double> metres = metres_in(unit);
-  if (!metres) throw UsageError("--error '" + text + "' has an unknown unit; see --units");
-  if (units.empty())
-    throw UsageError("--error '" + text +
-                     "' has a unit, but mesh files have none; pass --units with that of the coordinates");
-  return value * *metres;
 }
 
 /// Adds the balls outside of which the bound holds to the JSON document.
@@ -424,12 +497,14 @@ int run_bounded(const ConvertArguments& arguments, const CLI::App& command, Sess
   refuse_idle(command,
               {"--tiles", "--tile", "--extractor", "-o", "--voxelizer", "--voxelizer-option",
                "--exterior-band", "--interior-band", "--isovalue", "--max-loss", "--mask", "--frustum",
-               "--frustum-resolution", "--outside", "--tolerance-grid"},
+               "--frustum-resolution", "--outside", "--tolerance-grid", "--shell", "--offset"},
               "with --error and --triangles the method is chosen for the bound");
   const auto error = [&](double diagonal) {
-    return arguments.triangles ? 0.0 : error_in_world_units(arguments.error, session.units, diagonal);
+    return arguments.error.empty() ? 0.0
+                                   : positive_length("--error", arguments.error, session.metres, diagonal);
   };
-  error(1.0);
+  // Before the file is read, any unit is accepted.
+  if (!arguments.error.empty()) positive_length("--error", arguments.error, 1.0, 1.0);
   const Paths& paths = arguments.paths;
   BoundedRemeshOptions options{
       .signs = sign_rule(arguments.voxelizing),
@@ -441,11 +516,12 @@ int run_bounded(const ConvertArguments& arguments, const CLI::App& command, Sess
       .through_volume = arguments.through_volume,
       .except_thin = arguments.except_thin};
   check_mesh_output(paths.out);
-  const PolygonMesh mesh = read_polygons(paths.in, session);
+  const PolygonMesh mesh = read_input(arguments, session);
   const double diagonal = bounds(mesh).size().norm();
-  options.error = error(diagonal);
+  const double bound_asked = error(diagonal);
+  options.error = arguments.triangles ? 0.0 : bound_asked;
   Stopwatch watch;
-  const BoundedMesh made = about_file(paths.in, [&] {
+  BoundedMesh made = about_file(paths.in, [&] {
     if (!(diagonal > 0.0)) throw Error("the polygons have no extent");
     return arguments.triangles
                ? remesh_to_budget(mesh, std::size_t(*arguments.triangles), options, session.context)
@@ -458,6 +534,11 @@ int run_bounded(const ConvertArguments& arguments, const CLI::App& command, Sess
                      ? "no mesh of " + std::to_string(*arguments.triangles) + " triangles was found: "
                      : "") +
                 explanation(made) + "; nothing was written");
+  if (bound_asked > 0.0 && std::max(made.to_surface, made.from_surface) > bound_asked)
+    throw Error("'" + paths.in + "': the smallest certified error found for " +
+                std::to_string(*arguments.triangles) + " triangles is " +
+                length_text(session, std::max(made.to_surface, made.from_surface)) + ", above --error " +
+                length_text(session, bound_asked) + "; allow more triangles or a larger error");
   session.context.figure("error_asked", made.error);
   session.context.figure("certified_to_polygons", made.to_surface);
   session.context.figure("certified_from_polygons", made.from_surface);
@@ -470,15 +551,17 @@ int run_bounded(const ConvertArguments& arguments, const CLI::App& command, Sess
   if (made.thin) session.context.note(thin_note(*made.thin, made.voxel_size));
   report_thin_parts(made.thin, session);
   report_exceptions(made, session);
-  print_extracted(session, made.mesh,
-                  made.voxel_size > 0.0 ? "voxels of " + text(made.voxel_size) : "without a volume",
-                  watch.seconds());
+  print_extracted(
+      session, made.mesh,
+      made.voxel_size > 0.0 ? "voxels of " + length_text(session, made.voxel_size) : "without a volume",
+      watch.seconds());
   const double bound = std::max(made.to_surface, made.from_surface);
-  print_summary(session, "certified: the mesh is within " + text(made.to_surface) +
-                             " of the polygons' solid, and the solid within " + text(made.from_surface) +
-                             " of the mesh (" + text(100.0 * bound / diagonal) + "% of the diagonal)" +
+  print_summary(session, "certified: the mesh is within " + length_text(session, made.to_surface) +
+                             " of the polygons' solid, and the solid within " +
+                             length_text(session, made.from_surface) + " of the mesh (" +
+                             text(100.0 * bound / diagonal) + "% of the diagonal)" +
                              (made.excepted.empty() ? "" : ", EXCEPT at the places of a note"));
-  return save(arguments, made.mesh, session);
+  return save(arguments, made.mesh, mesh, session);
 }
 
 // ---- The command line.
@@ -519,11 +602,11 @@ void add_extract_options(CLI::App& command, ConvertArguments& arguments, const s
 void add_bound_options(CLI::App& command, CLI::App& size, ConvertArguments& arguments) {
   size.add_option("--error", arguments.error,
                   "In place of a size the certified bound of the two-sided distance between the mesh and the "
-                  "polygons' solid: in world units, with % of the bounding box's diagonal, or, with --units, "
-                  "with a unit (0.05mm)");
+                  "polygons' solid: in world units, with % of the bounding box's diagonal, or with a unit if "
+                  "that of the coordinates is known (0.05mm)");
   size.add_option("--triangles", arguments.triangles,
                   "In place of a size the maximum number of triangles; the mesh has the smallest certified "
-                  "error found")
+                  "error found. With --error the command fails if that is larger")
       ->transform(whole_number(4, std::int64_t(1) << 31));
   CLI::Option_group* group = command.add_option_group("With --error or --triangles");
   group->add_flag("--over-holes", arguments.over_holes,
@@ -547,6 +630,23 @@ void add_bound_options(CLI::App& command, CLI::App& size, ConvertArguments& argu
           "Smallest voxel size to try, in world units (default: an eighth of the error); the command "
           "fails if a wall or gap is too thin for it")
       ->check(CLI::PositiveNumber);
+}
+
+void add_solid_options(CLI::App& command, ConvertArguments& arguments) {
+  CLI::Option_group* group = command.add_option_group(
+      "Other solids than that of the polygons; lengths as of --error, with % of the diagonal or a unit");
+  CLI::Option* shell = group->add_option(
+      "--shell", arguments.shell,
+      "Thickness of walls: the solid of all points within half of it of the polygons, for sheets and open "
+      "surfaces. Without a size, voxels are a third of it");
+  group
+      ->add_option("--offset", arguments.offset,
+                   "Distance by which the solid grows or, with a negative number (--offset=-1mm), shrinks")
+      ->excludes(shell);
+  group
+      ->add_option("--fill-below", arguments.fill_below,
+                   "Height z of a flat base: closes a height field, such as a terrain, by walls and a base")
+      ->excludes(shell);
 }
 
 void add_tile_options(CLI::App& command, ConvertArguments& arguments) {
@@ -595,18 +695,26 @@ void add_conversions(CLI::App& app, Session& session) {
   add_paths(*command, session, arguments->paths, kMeshIn, FileKind::mesh, kMeshOut, FileKind::mesh, true);
   add_json_option(*command, session);
   CLI::App* size = add_voxelize_options(*command, arguments->voxelizing, false, true);
+  size->require_option(0, 2);
   add_extract_options(*command, *arguments, "manifold-dual-contouring");
   command->add_option("--max-loss", arguments->max_loss,
                       "Exit with 3 if more of the visible surface is lost, such as 1% (default: no limit, or "
                       "1% with --thin drop)");
   add_bound_options(*command, *size, *arguments);
-  set_work(*command, session, [arguments, command, &session] {
+  add_attributes_option(*command, arguments->attributes);
+  set_work(*command, session, [arguments, command, size, &session] {
+    const bool bounded_twice = arguments->triangles && !arguments->error.empty();
+    if (size->count_all() > 1 + std::size_t(bounded_twice))
+      throw UsageError(
+          "at most one of --voxel-size, --resolution, --error and --triangles determines the size, or "
+          "--error with --triangles");
     if (arguments->triangles || !arguments->error.empty()) return run_bounded(*arguments, *command, session);
     refuse_idle(*command,
                 {"--over-holes", "--except-thin", "--through-volume", "--limit-points", "--smallest-voxel"},
                 "it needs --error or --triangles");
     return run_remesh(*arguments, *command, session);
   });
+  add_solid_options(*command, *arguments);
   add_tile_options(*command, *arguments);
   add_join(app, session);
 }

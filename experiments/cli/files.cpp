@@ -47,6 +47,12 @@ std::optional<double> metres_in(const std::string& unit) {
   return std::nullopt;
 }
 
+std::string unit_of(double metres) {
+  for (const auto& [name, length] : kMetres)
+    if (length == metres) return name;
+  return text(metres) + " m";
+}
+
 void add_files(CLI::App& command, Session& session, CommandFiles given) {
   CommandFiles& files = session.files[&command] = std::move(given);
   const bool mesh = files.in != FileKind::imported &&
@@ -58,21 +64,22 @@ void add_files(CLI::App& command, Session& session, CommandFiles given) {
                                : "given by its kind"));
   command.add_option("--input-format", files.input_format,
                      "Format of the standard input if --format is that of the standard output");
-  if (files.output && (files.in == FileKind::mesh || files.in == FileKind::mesh_or_volume)) {
-    CLI::Option* scale =
-        command
-            .add_option("--scale", session.scale,
-                        "Factor from coordinates in the mesh file to world units (default: 1); --voxel-size "
-                        "and the output are in world units")
-            ->check(finite_number() & CLI::PositiveNumber);
+  if (files.in == FileKind::mesh || files.in == FileKind::mesh_or_volume) {
+    if (files.output)
+      command
+          .add_option("--scale", session.scale,
+                      "Factor from coordinates in the mesh file to world units (default: 1); --voxel-size "
+                      "and the output are in world units")
+          ->check(finite_number() & CLI::PositiveNumber);
     std::vector<std::string> units;
     for (const auto& [name, metres] : kMetres) units.push_back(name);
     command
-        .add_option("--units", session.units,
-                    "Unit of the coordinates in the mesh file: they are converted to metres, and the output "
-                    "is in metres; short for a --scale")
-        ->check(CLI::IsMember(units))
-        ->excludes(scale);
+        .add_option(
+            "--units", session.units,
+            "Unit of coordinates in mesh files, of lengths given as options, and of the output. Files "
+            "that state another unit (.3mf, .glb, .gltf) are converted, so that the size is the same "
+            "(default: the unit of the input)")
+        ->check(CLI::IsMember(units));
   }
   if (files.output && files.out != FileKind::folder)
     command.add_flag("--overwrite-input", files.overwrite_input,
@@ -126,7 +133,7 @@ CommandFiles* files_of_command(const CLI::App& app, Session& session) {
   for (const std::string* input : files.inputs)
     if (!input->empty()) session.inputs.push_back(*input);
   if (files.output) session.output = *files.output;
-  session.scale = metres_in(session.units).value_or(session.scale);
+  session.metres = metres_in(session.units).value_or(0.0);
   if (!files.takes_many || !is_batch(*asked[0], files)) return &files;
   session.command = [&files, &session, command = asked[0]] { return run_batch(*command, files, session); };
   session.writes_json_itself = true;

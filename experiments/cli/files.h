@@ -51,6 +51,8 @@ void add_paths(CLI::App& command, Session& session, Paths& paths, const std::str
 
 /// Returns the metres in a unit that --units takes; none for another word.
 std::optional<double> metres_in(const std::string& unit);
+/// Returns the name of a unit by its length in metres, or that length if --units has no such unit.
+std::string unit_of(double metres);
 
 /// Returns the files of the command on the command line; null if it works on no files, and for a batch, which
 /// becomes session.command. Sets the names of the command and of its files in the session.

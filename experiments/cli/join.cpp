@@ -28,11 +28,11 @@ int run_join(const JoinArguments& arguments, Session& session) {
     throw UsageError("'" + arguments.out +
                      "' would round the vertices of the parts to single precision, for which the mesh is not "
                      "proved; write .ply, .obj, .off, .glb or .3mf");
-  const bool in_metres = parts[0].in_metres;
+  const double metres = parts[0].metres;
   const PolygonMesh mesh = join_parts(std::move(parts));
   made(session, "parts", arguments.parts.size());
   print_extracted(session, mesh, std::to_string(arguments.parts.size()) + " parts", watch.seconds());
-  (in_metres ? write_mesh_in_metres : write_mesh)(arguments.out, mesh, session.context);
+  write_mesh(arguments.out, mesh, session.context, metres);
   work_is_finished();
   return kDone;
 }

@@ -36,7 +36,10 @@ std::vector<std::string> laboratory_command(const std::vector<std::string>& word
   if (!std::filesystem::exists(directory / "lab/__main__.py", error))
     throw Error("the laboratory is not in '" + directory.string() +
                 "'; clone the project's repository and set HERMESH_EXPERIMENTS to its directory experiments");
-  setenv("PYTHONPATH", std::filesystem::absolute(directory).parent_path().c_str(), 1);
+  // The caller's path follows, because programs of an experiment may need it.
+  std::string path = std::filesystem::absolute(directory).parent_path();
+  if (const char* const given = std::getenv("PYTHONPATH"); given && *given) path += std::string(":") + given;
+  setenv("PYTHONPATH", path.c_str(), 1);
   setenv("HERMESH", std::filesystem::canonical("/proc/self/exe").c_str(), 1);
   // Debian's interpreter sees the packages that Debian installs; another python3 on the path may not.
   const bool is_debian = access("/usr/bin/python3", X_OK) == 0;

@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <chrono>
 #include <cstdio>
 #include <cstring>
 #include <ctime>
@@ -58,6 +59,8 @@ class LogFile {
       } else if (stage != stage_) {
         stage_ = stage;
         line("stage '" + stage_ + "'");
+      } else if (std::chrono::steady_clock::now() - written_ >= std::chrono::minutes(1)) {
+        line("stage '" + stage_ + "', " + std::to_string(int(100.0 * fraction)) + " %");
       }
     };
   }
@@ -91,6 +94,7 @@ class LogFile {
     std::strftime(date, sizeof date, "%Y-%m-%dT%H:%M:%S", &parts);
     std::snprintf(end, sizeof end, ".%03dZ ", int(milliseconds));
     const std::string all = date + (end + shown(session_.named(text), 4000, true)) + "\n";
+    written_ = std::chrono::steady_clock::now();
     // A log that cannot be written must not end the work; the next line is tried again.
     [[maybe_unused]] const ssize_t written = write(file_, all.data(), all.size());
   }
@@ -98,6 +102,7 @@ class LogFile {
   Session& session_;
   int file_;
   std::size_t notes_ = 0;  ///< number of notes in the file
+  std::chrono::steady_clock::time_point written_ = {};
   std::string stage_;
 };
 

@@ -27,6 +27,10 @@ void print_summary(const Session& session, const std::string& line) {
   std::cout << session.named(line) << '\n';
 }
 
+std::string length_text(const Session& session, double length) {
+  return text(length) + (session.metres > 0.0 ? " " + unit_of(session.metres) : "");
+}
+
 std::string seconds_text(double seconds) {
   char buffer[32];
   std::snprintf(buffer, sizeof buffer, "%.3f s", seconds);

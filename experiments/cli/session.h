@@ -50,8 +50,9 @@ struct Session {
 
   std::map<const CLI::App*, CommandFiles> files;  ///< of the commands that work on files
   std::string command_name, command_line, version;
-  double scale = 1.0;               ///< world units per unit of the coordinates in an input mesh file
-  std::string units;                ///< of these coordinates if the world is in metres; empty: not given
+  double scale = 1.0;   ///< world units per unit of the coordinates in an input mesh file
+  std::string units;    ///< of coordinates, option values and output; empty: those of the input
+  double metres = 0.0;  ///< length of the world unit: that of `units`, else of the first input; 0: unknown
   std::vector<std::string> inputs;  ///< as the user named them
   std::string output;               ///< as the user named it; empty: none
   bool writes_json_itself = false;  ///< true if the command prints its own JSON, as a batch does line by line
@@ -74,6 +75,8 @@ inline void made(Session& session, const std::string& key, const Json& value) { 
 void print_summary(const Session& session, const std::string& line);
 
 std::string seconds_text(double seconds);  ///< "1.234 s"
+/// Returns the length in world units, with their name if it is known.
+std::string length_text(const Session& session, double length);
 
 /// Returns JSON text of the value with a line break at its end; bytes that are not UTF-8 become question
 /// marks. An `indent` of −1 writes one line.

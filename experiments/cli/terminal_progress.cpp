@@ -141,12 +141,15 @@ std::string duration_text(double seconds) {
   return std::to_string(minutes / 60) + " h " + std::to_string(minutes % 60) + " min";
 }
 
-TerminalProgress::TerminalProgress(RunContext& context, bool wanted, std::vector<PlannedStage> plan)
-    : context_(context) {
+TerminalProgress::TerminalProgress(RunContext& context, bool wanted, std::vector<PlannedStage> plan,
+                                   std::chrono::milliseconds first_line)
+    : context_(context), is_terminal_(isatty(STDERR_FILENO) == 1) {
   if (!plan.empty()) overall_.emplace(std::move(plan));
-  if (!wanted || !isatty(STDERR_FILENO)) return;
+  if (!wanted) return;
   context_.on_progress = [this](std::string_view stage, double fraction) { show(stage, fraction); };
-  thread_ = std::jthread([this](const std::stop_token& stop) { repeat(stop); });
+  thread_ = std::jthread([this, first_line](const std::stop_token& stop) {
+    is_terminal_ ? repeat(stop) : write_lines(stop, first_line);
+  });
 }
 
 TerminalProgress::~TerminalProgress() {
@@ -165,18 +168,22 @@ void TerminalProgress::show(std::string_view stage, double fraction) {
   fraction_ = fraction;
   if (now < next_) return;
   next_ = now + 100ms;
-  write_line(now, "");
+  if (is_terminal_) write_line(now, "");
+}
+
+std::string TerminalProgress::text(Clock::time_point now) const {
+  char percent[16];
+  std::snprintf(percent, sizeof percent, " %3.0f %%", 100.0 * std::clamp(fraction_, 0.0, 1.0));
+  if (!overall_) return stage_.substr(0, kLongestStage) + percent;
+  const std::chrono::duration<double> elapsed = now - start_, of_stage = now - stage_start_;
+  auto left = OverallProgress::left(fraction_, elapsed.count());
+  // A stage that takes longer than the estimate of all disproves it.
+  if (left && of_stage.count() > 2.0 * *left + 5.0) left.reset();
+  return std::string(percent + 1) + (left ? ", " + duration_text(*left) + " left" : "") + ": " + stage_;
 }
 
 void TerminalProgress::write_line(Clock::time_point now, const std::string& end) {
-  char percent[16];
-  std::snprintf(percent, sizeof percent, " %3.0f %%", 100.0 * std::clamp(fraction_, 0.0, 1.0));
-  std::string line = stage_.substr(0, kLongestStage) + percent;
-  if (overall_) {
-    const std::chrono::duration<double> elapsed = now - start_;
-    const auto left = OverallProgress::left(fraction_, elapsed.count());
-    line = std::string(percent + 1) + (left ? ", " + duration_text(*left) + " left" : "") + ": " + stage_;
-  }
+  std::string line = text(now);
   line.resize(std::min(line.size(), kLongestStage + 8 - end.size()));
   write_to_terminal(std::string(kErase) + line + end);
   terminal().line_is_shown = true;
@@ -191,6 +198,19 @@ void TerminalProgress::repeat(const std::stop_token& stop) {
     // Nothing is written soon after the line was erased either, because a summary may follow.
     if (stop.stop_requested() || stage_.empty() || now - terminal().written < kSilence) continue;
     write_line(now, " (" + duration_text(std::chrono::duration<double>(now - stage_start_).count()) + ")");
+  }
+}
+
+void TerminalProgress::write_lines(const std::stop_token& stop, std::chrono::milliseconds first_line) {
+  std::unique_lock lock(terminal().mutex);
+  for (std::chrono::milliseconds time = first_line; !stop.stop_requested(); time *= 2) {
+    terminal().changed.wait_until(lock, stop, start_ + time, [] { return false; });
+    if (stop.stop_requested()) return;
+    const auto now = Clock::now();
+    const double seconds = std::chrono::duration<double>(now - start_).count();
+    std::string line = text(now);
+    if (overall_) line.erase(0, line.find_first_not_of(' '));
+    write_to_terminal("hermesh: working for " + duration_text(seconds) + ", " + line + "\n");
   }
 }
 

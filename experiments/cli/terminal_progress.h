@@ -1,4 +1,5 @@
-// Progress on the terminal: one line on stderr, rewritten in place, with the progress of the whole command.
+// Progress on stderr: on a terminal one line, rewritten in place, with the progress of the whole command;
+// elsewhere a line after a minute and each time that the duration has doubled.
 #pragma once
 
 #include <chrono>
@@ -51,13 +52,15 @@ class OverallProgress {
 
 std::string duration_text(double seconds);  ///< "2 s", "3 min", "1 h 20 min"
 
-/// Shows the context's progress during its lifetime if stderr is a terminal and `wanted`; at most ten updates
-/// a second. With a plan the line has the progress of all stages and the remaining time, else the progress of
-/// the stage. The destructor erases it. If a stage reports nothing for a second, a thread rewrites the line
-/// with the time of the stage.
+/// Shows the context's progress during its lifetime if `wanted`; on a terminal at most ten updates a second.
+/// With a plan the line has the progress of all stages and the remaining time, else the progress of the
+/// stage. The destructor erases it. If a stage reports nothing for a second, a thread rewrites the line with
+/// the time of the stage. If stderr is not a terminal, lines are written after `first_line` of work, twice as
+/// long, and so on.
 class TerminalProgress {
  public:
-  TerminalProgress(RunContext& context, bool wanted, std::vector<PlannedStage> plan = {});
+  TerminalProgress(RunContext& context, bool wanted, std::vector<PlannedStage> plan = {},
+                   std::chrono::milliseconds first_line = std::chrono::minutes(1));
   ~TerminalProgress();
   TerminalProgress(const TerminalProgress&) = delete;
   TerminalProgress& operator=(const TerminalProgress&) = delete;
@@ -68,9 +71,13 @@ class TerminalProgress {
   void show(std::string_view stage, double fraction);
   /// Writes the line of the time `now`; the caller holds the lock of the terminal.
   void write_line(Clock::time_point now, const std::string& end);
+  /// Returns the progress, and the remaining time if it can be estimated.
+  std::string text(Clock::time_point now) const;
   void repeat(const std::stop_token& stop);
+  void write_lines(const std::stop_token& stop, std::chrono::milliseconds first_line);
 
   RunContext& context_;
+  bool is_terminal_;
   Clock::time_point next_ = {}, start_ = Clock::now();
   std::optional<OverallProgress> overall_;
   // Read by the thread, and written only under the lock of the terminal.

@@ -153,9 +153,11 @@ std::vector<Requirement> parse_requirements(const std::string& list) {
   return requirements;
 }
 
-std::optional<MeshFile> read_if_named(const std::string& file, RunContext& context) {
+std::optional<MeshFile> read_if_named(const std::string& file, Session& session) {
   if (file.empty()) return std::nullopt;
-  return read_mesh_file(file, context);
+  MeshFile mesh = read_mesh_file(file, session.context);
+  to_world_units(mesh, session);
+  return mesh;
 }
 
 int run_validate(const ValidateArguments& arguments, const CLI::App& command, Session& session) {
@@ -175,9 +177,9 @@ int run_validate(const ValidateArguments& arguments, const CLI::App& command, Se
     throw UsageError("--require solid needs --solid-samples");
   if (arguments.features.empty()) refuse_idle(command, {"--dihedral"}, "sharp edges are those of --features");
 
-  const MeshFile mesh = read_mesh_file(arguments.mesh, session.context);
-  const auto reference = read_if_named(arguments.reference, session.context);
-  const auto features = read_if_named(arguments.features, session.context);
+  const MeshFile mesh = *read_if_named(arguments.mesh, session);
+  const auto reference = read_if_named(arguments.reference, session);
+  const auto features = read_if_named(arguments.features, session);
   options.reference = reference ? &*reference : nullptr;
   options.features = features ? &*features : nullptr;
   if (arguments.reference_quads == "as-given") options.reference_quads = validation::QuadRule::as_given;

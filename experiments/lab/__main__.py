@@ -8,7 +8,7 @@ import os
 import pathlib
 import sys
 
-from . import baseline, benchmark, claims, compare, driver, listing, merge, release, tables
+from . import baseline, benchmark, claims, compare, driver, listing, merge, mutants, release, tables
 from .rows import LabError
 
 # Options that hermesh passes to each command; commands that do no work of their own ignore them.
@@ -51,7 +51,7 @@ def main(words=None):
     parser = Parser(prog="hermesh", description="Runs experiments and reads their rows.")
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
     for module in (driver, tables, claims, compare, baseline, merge, listing, benchmark,
-                   release):
+                   mutants, release):
         module.add_command(commands)
     for command in commands.choices.values():
         for option, settings in COMMON.items():

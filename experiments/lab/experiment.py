@@ -78,7 +78,9 @@ def choice(kind, known):
     """Returns a checker of names; None knows all."""
     def check(value, where):
         if text(value, where) and known is not None and value not in known:
-            raise LabError(f'{where}: there is no {kind} "{value}"; expected one of {joined(known, value)}')
+            everything = "experiments/lab/columns.toml" if kind == "column" else "`hermesh list`"
+            more = f"; {everything} lists all" if len(known) > 8 else ""
+            raise LabError(f'{where}: there is no {kind} "{value}"; expected one of {joined(known, value)}{more}')
         return value
     return check
 

@@ -1,6 +1,7 @@
 """Joins the shards of an experiment (`hermesh run --shard`) to the rows of the whole; the command `merge`."""
 
 import json
+import os
 import pathlib
 import shutil
 import sys
@@ -92,6 +93,13 @@ def _same_values(a, b):
             and all(compare_rows([x], [y], tolerance=0, costs=False).fine() for x, y in ((a, b), (b, a))))
 
 
+def _copy_in_one_step(source, target):
+    """Copies a file under another name and renames it, so that a killed process leaves no half of it."""
+    half = f"{target}.half"
+    shutil.copy2(source, half)
+    os.replace(half, target)
+
+
 def merge_shards(out, shards, text):
     """Writes the merged rows to out/rows.jsonl, after all meshes and pictures, and draws the plots.
 
@@ -106,7 +114,7 @@ def merge_shards(out, shards, text):
     rows, half = merged_rows(shards), out / "rows.half"
     own_files = shutil.ignore_patterns("*.jsonl", "shard.json*")
     for shard in shards:
-        shutil.copytree(shard, out, ignore=own_files, dirs_exist_ok=True)
+        shutil.copytree(shard, out, ignore=own_files, dirs_exist_ok=True, copy_function=_copy_in_one_step)
     half.unlink(missing_ok=True)
     append_rows(half, rows)
     half.rename(out / "rows.jsonl")

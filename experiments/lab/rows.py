@@ -152,7 +152,11 @@ def append_rows(file, rows):
     data = "".join(to_json(row) + "\n" for row in rows).encode(errors="replace")
     descriptor = os.open(file, os.O_WRONLY | os.O_APPEND | os.O_CREAT | os.O_CLOEXEC, 0o644)
     try:
-        if os.write(descriptor, data) != len(data):
+        if (written := os.write(descriptor, data)) != len(data):
+            # No half of a row stays behind, unless another run has appended to it.
+            end = os.lseek(descriptor, 0, os.SEEK_CUR)
+            if os.fstat(descriptor).st_size == end:
+                os.ftruncate(descriptor, end - written)
             raise LabError(f"cannot append rows to {file}: the disk is full")
     finally:
         os.close(descriptor)

@@ -211,7 +211,9 @@ BoundedRemesh remesh_within(const Mesh& mesh, const BoundOptions& options, Conte
     const BoundedRemeshOptions given{.error = options.error.value_or(0.0),
                                      .signs = sign_rule(options.signs),
                                      .over_holes = options.over_holes,
-                                     .most_points = options.most_points,
+                                     .most_points = options.most_points > 0.0 ? options.most_points
+                                                    : options.triangles       ? 4e5
+                                                                              : 3e7,
                                      .smallest_voxel = options.smallest_voxel,
                                      .written_in_single = options.written_in_single,
                                      .thin = options.thin == Thin::keep ? ThinRule::keep : ThinRule::drop,

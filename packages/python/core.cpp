@@ -144,28 +144,67 @@ void bind_mesh(py::module_& m) {
   const py::dict none;
   py::class_<Mesh>(
       m, "Mesh",
-      "Triangles and quads over shared points, counter-clockwise seen from outside, with attributes.\n\n"
-      "A mesh is immutable. Its arrays are read-only views, not copies; use `mesh.points.copy()` to write.")
-      .def(
-          py::init(&make_mesh), py::arg("points"), py::arg("triangles") = py::none(),
-          py::arg("quads") = py::none(), py::kw_only(), py::arg("point_attributes") = none,
-          py::arg("corner_attributes") = none, py::arg("polygon_attributes") = none,
-          py::arg("labels") = std::map<std::string, std::vector<std::string>>(),
-          "A mesh of arrays, which are copied once.\n\n"
-          "points: (n, 3) of float32 or float64, world units; float64 preserves precision far from the\n"
-          "    origin (see `origin`).\n"
-          "triangles, quads: (m, 3) and (k, 4) of int32 or uint32 (others are converted), from 0. Functions\n"
-          "    that sample polygons split each quad along its better diagonal.\n"
-          "point_attributes, corner_attributes, polygon_attributes: name to array, one row for each point,\n"
-          "    for each polygon's corner, or for each triangle and then each quad; 1 to 4 columns of\n"
-          "    float32, or one of integers (-1 means none).\n"
-          "labels: name of an integer attribute to the names of its values from 0 on.\n\n"
-          "Raises Error for an index out of range, a coordinate that is not finite, and wrong shapes.")
-      .def("with_attributes", &with_attributes, py::kw_only(), py::arg("point_attributes") = none,
+      R"(Triangles and quads over shared points, counter-clockwise seen from outside, with attributes.
+
+A mesh is immutable. Its arrays are read-only views, not copies; use `mesh.points.copy()` to write.
+
+Examples
+--------
+>>> mesh = hermesh.Mesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])
+>>> mesh.points.dtype, mesh.triangles.dtype
+(dtype('float32'), dtype('uint32'))
+>>> hermesh.Mesh([[0, 0, 0]], [[0, 1, 2]])
+Traceback (most recent call last):
+    ...
+hermesh.Error: triangle number 0 refers to point 1, but there are 1 points (both count from 0)
+)")
+      .def(py::init(&make_mesh), py::arg("points"), py::arg("triangles") = py::none(),
+           py::arg("quads") = py::none(), py::kw_only(), py::arg("point_attributes") = none,
            py::arg("corner_attributes") = none, py::arg("polygon_attributes") = none,
            py::arg("labels") = std::map<std::string, std::vector<std::string>>(),
-           "Returns a mesh of the same polygons with these attributes, given as to Mesh(), in place of its\n"
-           "own; all arrays are copied. Raises Error for an attribute with a wrong number of values.")
+           R"(Makes a mesh of arrays, which are copied once.
+
+Parameters
+----------
+points : array_like, shape (n, 3)
+    float32 or float64, world units; float64 preserves precision far from the origin (see `origin`).
+triangles : array_like, shape (m, 3), optional
+    Indices of points from 0 on, int32 or uint32 (others are converted).
+quads : array_like, shape (k, 4), optional
+    As `triangles`. Functions that sample polygons split each quad along its better diagonal.
+point_attributes, corner_attributes, polygon_attributes : dict of str to array_like, optional
+    One row for each point, for each corner of a polygon, or for each triangle and then each quad; 1 to 4
+    columns of float32, or one of integers (-1 means none).
+labels : dict of str to list of str, optional
+    Name of an integer attribute to the names of its values from 0 on.
+
+Raises
+------
+Error
+    If an index is out of range, a coordinate is not finite, or an array has the wrong shape.
+)")
+      .def(
+          "with_attributes", &with_attributes, py::kw_only(), py::arg("point_attributes") = none,
+          py::arg("corner_attributes") = none, py::arg("polygon_attributes") = none,
+          py::arg("labels") = std::map<std::string, std::vector<std::string>>(),
+          R"(Returns a mesh of the same polygons whose attributes are replaced by these; all arrays are copied.
+
+Parameters
+----------
+point_attributes, corner_attributes, polygon_attributes, labels : optional
+    As in the constructor.
+
+Raises
+------
+Error
+    If an attribute has a wrong number of values.
+
+Examples
+--------
+>>> mesh = hermesh.as_mesh(cube).with_attributes(polygon_attributes={"material": np.arange(6)})
+>>> mesh.polygon_attributes["material"]
+array([0, 1, 2, 3, 4, 5], dtype=int32)
+)")
       .def_property_readonly("points", &points_of,
                              "(n, 3) float32, world units relative to `origin`; a read-only view.")
       .def_property_readonly(
@@ -196,7 +235,13 @@ void bind_mesh(py::module_& m) {
           "hermesh\n"
           "means the triangles abc and acd.")
       .def("triangulated", &triangulated,
-           "(m + 2 k, 3) uint32: the triangles, then two for each quad, in a new array.")
+           R"((m + 2 k, 3) uint32: the triangles, then two for each quad, in a new array.
+
+Examples
+--------
+>>> hermesh.as_mesh(cube).triangulated().shape
+(12, 3)
+)")
       .def_property_readonly(
           "point_attributes", [](const Mesh& mesh) { return attributes_of(mesh, AttributeDomain::point); },
           "Name to a read-only view, one row for each point.")
@@ -277,30 +322,78 @@ void bind_volume(py::module_& m) {
       "A sparse grid of values with its placement, which owns an OpenVDB grid; immutable.\n\n"
       "A level set has signed distances in world units, negative inside, within a narrow band and plus or\n"
       "minus `background` beyond.")
-      .def_static(
-          "from_numpy", &make_volume, py::arg("values"), py::kw_only(),
-          py::arg("lower") = std::array<int, 3>{0, 0, 0}, py::arg("voxel_size") = 1.0,
-          py::arg("origin") = std::array<double, 3>{0, 0, 0}, py::arg("placement") = py::none(),
-          py::arg("level_set") = false, py::arg("background") = py::none(), py::arg("name") = "",
-          "A volume of a dense array.\n\n"
-          "values: (nx, ny, nz), float32 (others are converted); values[x, y, z] is the sample with the\n"
-          "    index lower + (x, y, z), which lies at origin + voxel_size * index, world units, or where\n"
-          "    `placement`, (3, 4) or (4, 4), maps the index.\n"
-          "level_set: True: signed distances in world units, negative inside; those of at least the\n"
-          "    background become the background. False: every sample is active, and the volume ends at its\n"
-          "    box.\n"
-          "background: the value beyond the samples; None: the greatest magnitude of a level set, else\n"
-          "    just below the least value.\n\n"
-          "Raises Error for values that are not finite and a placement that cannot be inverted.")
+      .def_static("from_numpy", &make_volume, py::arg("values"), py::kw_only(),
+                  py::arg("lower") = std::array<int, 3>{0, 0, 0}, py::arg("voxel_size") = 1.0,
+                  py::arg("origin") = std::array<double, 3>{0, 0, 0}, py::arg("placement") = py::none(),
+                  py::arg("level_set") = false, py::arg("background") = py::none(), py::arg("name") = "",
+                  R"(Makes a volume of a dense array.
+
+Parameters
+----------
+values : array_like, shape (nx, ny, nz)
+    float32 (others are converted); values[x, y, z] is the sample with the index lower + (x, y, z).
+lower : sequence of three int, default (0, 0, 0)
+    Index of the first sample.
+voxel_size : float, default 1.0
+    Edge of a voxel, world units.
+origin : sequence of three float, default (0, 0, 0)
+    Position of the sample with the index (0, 0, 0).
+placement : array_like, shape (3, 4) or (4, 4), optional
+    Maps an index to a position, instead of `voxel_size` and `origin`.
+level_set : bool, default False
+    True: values are signed distances in world units, negative inside; those of at least the background
+    become the background. False: every sample is active, and the volume ends at its box.
+background : float, optional
+    Value beyond the samples. By default the greatest magnitude of a level set, else just below the least
+    value.
+name : str, optional
+    By default `sdf` or `volume`.
+
+Raises
+------
+Error
+    If a value is not finite, or the placement cannot be inverted.
+
+Examples
+--------
+>>> x, y, z = np.mgrid[-10:11, -10:11, -10:11]
+>>> ball = hermesh.Volume.from_numpy(np.sqrt(x**2 + y**2 + z**2) - 7.0, lower=(-10, -10, -10), level_set=True)
+>>> hermesh.validate(hermesh.extract(ball)).watertight
+True
+)")
       .def("to_numpy", &dense_of, py::arg("lower") = py::none(), py::arg("dims") = py::none(),
-           "(nx, ny, nz) float32: the box of the active samples, whose first index is `lower`, or another "
-           "box.")
+           R"(Returns a box of samples as a new array, (nx, ny, nz) float32.
+
+Parameters
+----------
+lower, dims : sequence of three int, optional
+    Index of the first sample, and numbers of samples. By default those of the active samples.
+
+Examples
+--------
+>>> volume = hermesh.voxelize(cube, resolution=20)
+>>> volume.to_numpy().shape == volume.dims
+True
+)")
       .def("sample", &sampled, py::arg("places"),
-           "(n,) float32: values at places, (n, 3), world units; trilinear between samples.")
-      .def_property_readonly("name", &Volume::name)
-      .def("with_name", &Volume::with_name, py::arg("name"), "The same samples under another name.")
+           R"(Returns the values at positions, (n,) float32, trilinear between samples.
+
+Parameters
+----------
+places : array_like, shape (n, 3)
+    World units.
+
+Examples
+--------
+>>> hermesh.voxelize(cube, resolution=20).sample([[0.5, 0.5, 1.0]])
+array([0.], dtype=float32)
+)")
+      .def_property_readonly("name", &Volume::name, "Name of the grid in a .vdb file.")
+      .def("with_name", &Volume::with_name, py::arg("name"),
+           "Returns a volume of the same samples with another name.")
       .def_property_readonly("value_type", &Volume::value_type, "\"float\", \"int32\", \"vec3s\", ...")
-      .def_property_readonly("is_level_set", &Volume::is_level_set)
+      .def_property_readonly("is_level_set", &Volume::is_level_set,
+                             "True if the values are signed distances in world units.")
       .def_property_readonly(
           "placement",
           [](const Volume& volume) {
@@ -310,13 +403,13 @@ void bind_volume(py::module_& m) {
             map[15] = 1.0;
             return owning(std::move(map), {4, 4});
           },
-          "(4, 4) float64: maps the index (i, j, k, 1) of a sample to its place, world units.")
+          "(4, 4) float64: maps the index (i, j, k, 1) of a sample to its position, world units.")
       .def_property_readonly("voxel_size", &Volume::voxel_size, "World units; cube root of a voxel's volume.")
       .def_property_readonly("background", &Volume::background,
                              "The value beyond the samples; world units in a level set.")
       .def_property_readonly("value_range", &Volume::value_range, "Least and greatest value of the samples.")
-      .def_property_readonly("active_voxels", &Volume::active_voxels)
-      .def_property_readonly("memory_bytes", &Volume::memory_bytes)
+      .def_property_readonly("active_voxels", &Volume::active_voxels, "Number of samples with a value.")
+      .def_property_readonly("memory_bytes", &Volume::memory_bytes, "Memory of the grid.")
       .def_property_readonly(
           "lower",
           [](const Volume& volume) {
@@ -372,14 +465,31 @@ void bind_options(py::module_& m) {
            py::arg("look_at") = std::array<double, 3>{0, 0, -1},
            py::arg("up") = std::array<double, 3>{0, 1, 0}, py::arg("angle") = 45.0, py::arg("aspect") = 1.0,
            py::arg("near") = 0.1, py::arg("far") = 100.0,
-           "angle: vertical, from the lower to the upper plane. aspect: width over height.")
-      .def_readonly("position", &Frustum::position)
-      .def_readonly("look_at", &Frustum::look_at)
-      .def_readonly("up", &Frustum::up)
-      .def_readonly("angle", &Frustum::angle)
-      .def_readonly("aspect", &Frustum::aspect)
-      .def_readonly("near", &Frustum::near)
-      .def_readonly("far", &Frustum::far);
+           R"(Makes the view of a camera.
+
+Parameters
+----------
+position, look_at, up : sequence of three float
+    Position of the camera, point in the centre of the view, and upward direction.
+angle : float, default 45.0
+    Vertical, from the lower to the upper plane, degrees.
+aspect : float, default 1.0
+    Width over height.
+near, far : float, default 0.1 and 100.0
+    Distances of the planes that limit the view.
+
+Examples
+--------
+>>> view = hermesh.Frustum(position=(0.5, 0.5, 3), look_at=(0.5, 0.5, 0), near=1.5, far=10)
+>>> mesh = hermesh.remesh(cube, resolution=20, frustum=view)
+)")
+      .def_readonly("position", &Frustum::position, "World units.")
+      .def_readonly("look_at", &Frustum::look_at, "World units.")
+      .def_readonly("up", &Frustum::up, "World units.")
+      .def_readonly("angle", &Frustum::angle, "Degrees.")
+      .def_readonly("aspect", &Frustum::aspect, "Width over height.")
+      .def_readonly("near", &Frustum::near, "World units.")
+      .def_readonly("far", &Frustum::far, "World units.");
   py::class_<ExtractOptions>(m, "ExtractOptions")
       .def(py::init<>())
       .def_readwrite("extractor", &ExtractOptions::extractor)
@@ -415,7 +525,7 @@ void bind_options(py::module_& m) {
       .def_readwrite("hermite", &FractureOptions::hermite);
 
   py::class_<Piece>(m, "Piece", "One piece of a broken solid.")
-      .def_readonly("name", &Piece::name)
+      .def_readonly("name", &Piece::name, "Name of its file in the program.")
       .def_readonly(
           "mesh", &Piece::mesh,
           "World units. The method labelled adds polygon attributes `surface` (0 original, 1 cut) and\n"
@@ -434,7 +544,7 @@ void bind_options(py::module_& m) {
                     "Number of a neighbour, from 1, to the triangles and the area of the seam with it.")
       .def("__repr__", [](const Piece& piece) { return "<hermesh.Piece '" + piece.name + "'>"; });
   py::class_<Fracture>(m, "Fracture", "A solid in pieces; piece number n is pieces[n - 1].")
-      .def_readonly("pieces", &Fracture::pieces)
+      .def_readonly("pieces", &Fracture::pieces, "All pieces.")
       .def_readonly("seconds", &Fracture::seconds, "Seconds of the method itself.")
       .def("__len__", [](const Fracture& fracture) { return fracture.pieces.size(); })
       .def("__repr__", [](const Fracture& fracture) {
@@ -442,21 +552,23 @@ void bind_options(py::module_& m) {
       });
 
   py::class_<OptionInfo>(m, "OptionInfo", "An option of a method.")
-      .def_readonly("name", &OptionInfo::name)
+      .def_readonly("name", &OptionInfo::name, "The keyword.")
       .def_readonly("fallback", &OptionInfo::fallback, "The value when none is given.")
-      .def_readonly("help", &OptionInfo::help)
+      .def_readonly("help", &OptionInfo::help, "The meaning of the option.")
       .def_readonly("choices", &OptionInfo::choices, "Empty: a number from minimum to maximum.")
-      .def_readonly("minimum", &OptionInfo::minimum)
-      .def_readonly("maximum", &OptionInfo::maximum)
+      .def_readonly("minimum", &OptionInfo::minimum, "Of a number.")
+      .def_readonly("maximum", &OptionInfo::maximum, "Of a number.")
       .def("__repr__", [](const OptionInfo& option) { return option.name + "=" + option.fallback; });
   py::class_<MethodInfo>(m, "MethodInfo", "A method, and the guarantees of an extractor for every input.")
-      .def_readonly("name", &MethodInfo::name)
-      .def_readonly("summary", &MethodInfo::summary)
-      .def_readonly("closed", &MethodInfo::closed)
-      .def_readonly("manifold", &MethodInfo::manifold)
-      .def_readonly("oriented", &MethodInfo::oriented)
-      .def_readonly("free_of_self_intersection", &MethodInfo::free_of_self_intersection)
-      .def_readonly("options", &MethodInfo::options)
+      .def_readonly("name", &MethodInfo::name, "Value of `extractor` or `voxelizer`.")
+      .def_readonly("summary", &MethodInfo::summary, "One line.")
+      .def_readonly("closed", &MethodInfo::closed, "No edge has only one polygon.")
+      .def_readonly("manifold", &MethodInfo::manifold,
+                    "No edge has more than two polygons, and the polygons of a point are one fan.")
+      .def_readonly("oriented", &MethodInfo::oriented, "Adjacent polygons have the same orientation.")
+      .def_readonly("free_of_self_intersection", &MethodInfo::free_of_self_intersection,
+                    "No two triangles intersect.")
+      .def_readonly("options", &MethodInfo::options, "Those of the method itself.")
       .def("__repr__", [](const MethodInfo& method) { return method.name + ": " + method.summary; });
 }
 
@@ -471,8 +583,33 @@ Boolean boolean_of(const std::string& operation) {
 
 void bind_functions(py::module_& m) {
   m.def("version", &version);
-  m.def("extractors", &extractors, "Returns the available extractors, with their options.");
-  m.def("voxelizers", &voxelizers, "Returns the available voxelizers, with their options.");
+  m.def("extractors", &extractors, R"(Returns the available extractors.
+
+Returns
+-------
+list of MethodInfo
+    With their options and guarantees.
+
+Examples
+--------
+>>> methods = {method.name: method for method in hermesh.extractors()}
+>>> [name for name, method in methods.items() if method.free_of_self_intersection]
+['manifold-dual-contouring', 'certified-octree']
+>>> [option.fallback for option in methods["manifold-dual-contouring"].options if option.name == "tolerance"]
+['0.1']
+)");
+  m.def("voxelizers", &voxelizers, R"(Returns the available voxelizers.
+
+Returns
+-------
+list of MethodInfo
+    With their options.
+
+Examples
+--------
+>>> "hermesh" in [method.name for method in hermesh.voxelizers()]
+True
+)");
   m.def("read_mesh", [](const std::filesystem::path& path, bool attributes, Watch& watch) {
     return watched(watch, [&](Context& context) { return read_mesh(path, context, attributes); });
   });
@@ -482,7 +619,29 @@ void bind_functions(py::module_& m) {
   m.def("read_vdb", [](const std::filesystem::path& path, const std::string& grid, Watch& watch) {
     return watched(watch, [&](Context& context) { return read_vdb(path, context, grid); });
   });
-  m.def("grid_names", &grid_names, py::arg("path"), "Returns the names of the grids of a .vdb file.");
+  m.def("grid_names", &grid_names, py::arg("path"), R"(Returns the names of the grids of a .vdb file.
+
+Parameters
+----------
+path : path-like
+    The file.
+
+Returns
+-------
+list of str
+    In the order of the file.
+
+Raises
+------
+Error
+    If the file is missing or damaged.
+
+Examples
+--------
+>>> hermesh.voxelize(cube, resolution=20).write("cube.vdb")
+>>> hermesh.grid_names("cube.vdb")
+['sdf']
+)");
   m.def("write_vdb", [](const std::filesystem::path& path, const std::vector<Volume>& volumes, Watch& watch) {
     watched(watch, [&](Context& context) { return write_vdb(path, volumes, context), true; });
   });
@@ -557,7 +716,10 @@ PYBIND11_MODULE(_core, m) {
   m.doc() = "Bindings of the public C++ functions; use the package hermesh.";
   // Both translate exceptions of all extension modules of this process, validation included.
   py::register_exception<hermesh::Error>(m, "Error", PyExc_RuntimeError).attr("__module__") = "hermesh";
+  m.attr("Error").attr("__doc__") =
+      "Invalid input, an option that is unknown or has no effect, or a failure, with the reason.";
   py::register_exception<hermesh::Cancelled>(m, "Cancelled", PyExc_Exception).attr("__module__") = "hermesh";
+  m.attr("Cancelled").attr("__doc__") = "Raised if `cancel` of a function is set.";
   hermesh::python::bind_mesh(m);
   hermesh::python::bind_volume(m);
   hermesh::python::bind_options(m);

@@ -78,7 +78,8 @@ inline constexpr int kLeastTile = 16;
 class TilePatches {
  public:
   /// @param uniform, keys the mesh and the keys of its vertices
-  /// @param side of the tiles, in cells
+  /// @param decimation side of the tiles and tolerance
+  /// @param file precision of the output
   /// @param only the tile whose patch is made; all if there is none
   TilePatches(UniformMesh uniform, std::vector<VertexKey> keys, const TileDecimation& decimation,
               const FilePoints& file, const std::optional<TileAt>& only);

@@ -365,8 +365,9 @@ LevelSet read_stored(ByteSource& source, const StoredSamples& stored, const Impo
   initialize_openvdb();
   const std::vector<float> values = read_values(source, stored, options, context);
   const auto [lowest, highest] = std::ranges::minmax_element(values);
-  // Below every sample, so that space beyond the box is outside at any isovalue.
-  const float background = just_below(*lowest);
+  // Below every sample, so that space beyond the box is outside at any isovalue, and 0 for a mask that fills
+  // its image.
+  const float background = *lowest > 0.0f ? 0.0f : just_below(*lowest);
   if (!std::isfinite(background))
     throw Error(joined(stored.file, " holds the lowest number of single precision; rescale its samples"));
   note_likely_labels(values, stored, *lowest, *highest, context);

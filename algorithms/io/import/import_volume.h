@@ -3,11 +3,11 @@
 // The result is a grid of floats with an active sample for each of the file's, so the active voxels fill the
 // box of the data (extraction/volume_ends.h needs its ends); constant regions become tiles. Its transform
 // takes index coordinates to millimetres. Its class is "unknown", since its values are not distances. Its
-// background is the next single precision below the smallest value: values greater than an isovalue are
-// inside. Metadata give the source: hermesh_source (the file's name without directories),
-// hermesh_sample_type, hermesh_minimum and hermesh_maximum, the bounds of useful isovalues. If integer
-// samples look like labels (few values, nearly all equal to their neighbours), a note recommends to import
-// them as such.
+// background is 0 if all values are positive, and else the next single precision below the smallest: values
+// greater than an isovalue are inside. Metadata give the source: hermesh_source (the file's name without
+// directories), hermesh_sample_type, hermesh_minimum and hermesh_maximum, the bounds of useful isovalues. If
+// integer samples look like labels (few values, nearly all equal to their neighbours), a note recommends to
+// import them as such.
 //
 // Debian's libniftiio is not used: it writes errors to stderr, allocates the memory that a header claims
 // before it checks the file, and multiplies dimensions unchecked.

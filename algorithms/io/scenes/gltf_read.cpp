@@ -576,6 +576,7 @@ class GltfReader {
   /// children.
   std::vector<std::size_t> roots() {
     // Scenes are alternatives, which would overlap.
+    builder_.mesh.metres = 1.0;
     const std::size_t scenes = list(root_, "scenes").size();
     if (scenes > 1) builder_.note("it has ", scenes, " scenes; the default one was read");
     if (scenes > 0) return indices(entry("scenes", count_if_any(root_, "scene").value_or(0)), "nodes");

@@ -56,7 +56,7 @@ class BufferWriter {
 };
 
 /// Returns the JSON up to the URI of the buffer.
-std::string json_of(const PolygonMesh& mesh) {
+std::string json_of(const PolygonMesh& mesh, double metres) {
   const std::string head = R"({"asset":{"generator":"hermesh","version":"2.0"},"scene":0,"scenes":[{)";
   // An accessor has at least one element, so an empty mesh is a scene without nodes.
   if (mesh.empty()) return head + "}]";
@@ -66,7 +66,9 @@ std::string json_of(const PolygonMesh& mesh) {
   // Bounds of all points, used or not, as validators of the format compute them.
   const std::size_t points = mesh.points.size(), corners = 3 * mesh.triangle_count();
   std::string text = head + R"("nodes":[0]}],"nodes":[{"mesh":0)";
-  if (const auto origin = stated_origin(mesh)) text += R"(,"translation":)" + list_of(*origin);
+  if (const auto origin = stated_origin(mesh))
+    text += R"(,"translation":)" + list_of(Eigen::Vector3d(metres * *origin));
+  if (metres != 1.0) text += R"(,"scale":)" + list_of(Eigen::Vector3d(Eigen::Vector3d::Constant(metres)));
   text += R"(}],"meshes":[{"primitives":[{"attributes":{"POSITION":0},"indices":1}]}],"accessors":[)"
           R"({"bufferView":0,"componentType":5126,"count":)" +
           std::to_string(points) + R"(,"type":"VEC3","min":)" + list_of(lower) + R"(,"max":)" +
@@ -89,13 +91,14 @@ void write_buffer(const ByteSink& out, const PolygonMesh& mesh, bool base64) {
 
 }  // namespace
 
-void write_gltf(const ByteSink& out, const PolygonMesh& mesh, bool binary, const std::string& file) {
+void write_gltf(const ByteSink& out, const PolygonMesh& mesh, bool binary, const std::string& file,
+                double metres) {
   // Not by a library: the text is short, and its bytes must not change with the version of a library.
   const auto word = [](std::uint64_t value) {
     const auto bytes = bytes_of_number(static_cast<std::uint32_t>(value));
     return std::string(bytes.data(), bytes.size());
   };
-  std::string json = json_of(mesh);
+  std::string json = json_of(mesh, metres);
   if (!binary) {
     out(json);
     if (!mesh.empty()) {

@@ -4,6 +4,7 @@
 #include <functional>
 #include <string>
 #include <string_view>
+#include <utility>
 
 #include "algorithms/io/mesh_file_formats.h"
 
@@ -25,7 +26,7 @@ void read_gltf(std::string_view bytes, MeshBuilder& builder);
 bool begins_like_glb(std::string_view bytes);
 
 /// Reads the objects that the build of a 3MF file lists, with components, including those that the production
-/// extension stores in separate files. A unit other than the millimetre is noted, and changes no number.
+/// extension stores in separate files. The unit is that of MeshFile::metres, and changes no number.
 /// Support objects, items that are not to be printed, beam lattices, and parts that a slicer marks as
 /// negative or as modifiers are left out, with notes.
 /// @throws Error for a damaged file, or one that requires an extension that changes its shape.
@@ -33,16 +34,23 @@ void read_three_mf(std::string_view bytes, MeshBuilder& builder);
 
 /// Writes a mesh as glTF 2.0 with its buffer inside, as .glb or as text. Quads become two triangles. The
 /// points are those of the mesh in single precision, and its origin is the translation of the node, so that
-/// nothing is rounded.
+/// nothing is rounded. @param metres length of the unit of the mesh: the scale of the node
 /// @throws Error if the mesh is too large for a .glb file, whose lengths have 32 bits.
-void write_gltf(const ByteSink& out, const PolygonMesh& mesh, bool binary, const std::string& file);
+void write_gltf(const ByteSink& out, const PolygonMesh& mesh, bool binary, const std::string& file,
+                double metres);
 
-/// Writes a mesh as 3MF; `unit` is the format's word for the unit of the coordinates. Quads become two
+/// Writes a mesh as 3MF. @param metres length of the unit of the mesh: the unit of the file if it is one of
+/// kThreeMfUnits, else the scale of the build's item in millimetres; 0: millimetres. Quads become two
 /// triangles; triangles with a corner twice, which the format forbids, are left out with a note. Numbers are
 /// the shortest text of the double; the origin of the mesh is the translation of the build's item. The packed
 /// file is built in memory.
-void write_three_mf(const ByteSink& out, const PolygonMesh& mesh, std::string_view unit,
-                    const std::string& file, RunContext& context);
+void write_three_mf(const ByteSink& out, const PolygonMesh& mesh, double metres, const std::string& file,
+                    RunContext& context);
+
+/// The units of 3MF, and their lengths in metres.
+inline constexpr std::pair<std::string_view, double> kThreeMfUnits[] = {
+    {"micron", 1e-6}, {"millimeter", 1e-3}, {"centimeter", 1e-2},
+    {"inch", 0.0254}, {"foot", 0.3048},     {"meter", 1.0}};
 
 /// Returns the origin that a file of these formats has to state because a reader would choose another one.
 std::optional<Eigen::Vector3d> stated_origin(const PolygonMesh& mesh);

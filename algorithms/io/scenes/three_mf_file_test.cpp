@@ -72,12 +72,16 @@ TEST_F(ThreeMfFileTest, NumbersKeepDoublePrecision) {
             Vector3d(123456.70123456789, 0, 0));
 }
 
-TEST_F(ThreeMfFileTest, AUnitOtherThanTheMillimetreIsANote) {
-  EXPECT_EQ(read(model_of(object_of(1, kTriangle), "<item objectid=\"1\"/>", "unit=\"inch\"")).points[1],
-            Vector3d(1, 0, 0));
-  ASSERT_EQ(context.notes.size(), 1u);
-  EXPECT_EQ(context.notes[0], "'a.3mf': its lengths are of the unit 'inch'; the numbers are unchanged");
-  read(model_of(object_of(1, kTriangle), "<item objectid=\"1\"/>", "unit=\"millimeter\""));
+TEST_F(ThreeMfFileTest, TheUnitIsReadAndChangesNoNumber) {
+  const auto with = [&](const std::string& unit) {
+    return read(model_of(object_of(1, kTriangle), "<item objectid=\"1\"/>", unit));
+  };
+  EXPECT_EQ(with("unit=\"inch\"").points[1], Vector3d(1, 0, 0));
+  EXPECT_EQ(with("unit=\"inch\"").metres, 0.0254);
+  EXPECT_EQ(with("unit=\"millimeter\"").metres, 0.001);
+  EXPECT_EQ(with("").metres, 0.001);
+  EXPECT_TRUE(context.notes.empty());
+  EXPECT_EQ(with("unit=\"cubit\"").metres, 0.0);
   EXPECT_EQ(context.notes.size(), 1u);
 }
 
@@ -298,13 +302,21 @@ TEST_F(ThreeMfFileTest, ArchivesMadeToDoHarmAreRefused) {
 
 TEST_F(ThreeMfFileTest, TheUnitIsTheMillimetreUnlessItIsKnown) {
   const PolygonMesh mesh = random_mesh(1, {1, 2, 3});
-  write_mesh(folder / "a.3mf", mesh, context);
-  const PolygonMesh read_back = read_mesh(folder / "a.3mf", context);
-  EXPECT_TRUE(
-      std::ranges::none_of(context.notes, [](const auto& note) { return note.find("unit") != note.npos; }));
-  write_mesh_in_metres(folder / "b.3mf", mesh, context);
-  EXPECT_EQ(read_mesh(folder / "b.3mf", context), read_back);
-  expect_words(context.notes.back(), "'meter'");
+  const MeshFile numbers = to_mesh_file(mesh);
+  for (const double metres : {0.0, 1e-3, 0.0254, 1.0}) {
+    write_mesh(folder / "a.3mf", mesh, context, metres);
+    const MeshFile read_back = read_mesh_file(folder / "a.3mf", context);
+    EXPECT_EQ(read_back.points, numbers.points);
+    EXPECT_EQ(read_back.metres, metres > 0.0 ? metres : 1e-3);
+  }
+  // Kilometres are none of the format's units, and glTF has metres only.
+  for (const char* name : {"a.3mf", "a.glb", "a.gltf"}) {
+    write_mesh(folder / name, mesh, context, 1000.0);
+    const MeshFile scaled = read_mesh_file(folder / name, context);
+    const Bounds here = bounds(mesh), there = bounds(to_polygon_mesh(scaled));
+    EXPECT_LT((scaled.metres * there.lower - 1000.0 * here.lower).norm(), 1e-4) << name;
+    EXPECT_LT((scaled.metres * there.upper - 1000.0 * here.upper).norm(), 1e-4) << name;
+  }
 }
 
 /// Ten objects of ten components each would be ten thousand million triangles.

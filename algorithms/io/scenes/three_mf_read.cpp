@@ -299,8 +299,15 @@ class ThreeMfReader {
       check_extensions(xml);
       // Most files are in millimetres, the unit that slicers assume for STL, too.
       const std::string_view unit = xml.attribute("unit").value_or("millimeter");
-      if (root && unit != "millimeter")
-        builder_.note("its lengths are of the unit ", quoted_word(unit), "; the numbers are unchanged");
+      if (root) {
+        const auto known =
+            std::ranges::find(kThreeMfUnits, unit, &std::pair<std::string_view, double>::first);
+        if (known != std::end(kThreeMfUnits))
+          builder_.mesh.metres = known->second;
+        else
+          builder_.note("its lengths are of the unknown unit ", quoted_word(unit),
+                        "; the numbers are unchanged");
+      }
       // The production extension names files by attributes under the prefix that this model declares.
       path_attribute_ = std::string(xml.prefix_for("/3dmanufacturing/production/").value_or("p")) + ":path";
       xml.for_each_child([&] { read_part(xml, name, root); });
@@ -440,10 +447,8 @@ class ThreeMfReader {
   void note_left_out() {
     if (not_printed_ > 0)
       builder_.note("objects left out because they are support or not to be printed: ", not_printed_);
-    if (negative_ > 0)
-      builder_.note("parts left out that a slicer subtracts, as combine can: ", negative_);
-    if (modifiers_ > 0)
-      builder_.note("parts left out that only change a slicer's settings: ", modifiers_);
+    if (negative_ > 0) builder_.note("parts left out that a slicer subtracts, as combine can: ", negative_);
+    if (modifiers_ > 0) builder_.note("parts left out that only change a slicer's settings: ", modifiers_);
     if (lattices_ == 0) return;
     if (builder_.mesh.triangle_count() == 0)
       builder_.fail("it consists of beam lattices, which are not read; export it as triangles");

@@ -1,4 +1,6 @@
 // 3MF out: one object, one item of the build.
+#include <algorithm>
+
 #include "algorithms/io/scenes/scene_files.h"
 #include "algorithms/io/scenes/zip_archive.h"
 
@@ -33,8 +35,11 @@ class ModelWriter {
   ModelWriter(ZipWriter& archive, const RunContext& context) : archive_(archive), context_(context) {}
 
   /// Writes the model and returns the number of triangles that were left out.
-  std::size_t write(const PolygonMesh& mesh, std::string_view unit) {
-    text(kHeadToUnit).text(unit).text(kHeadBehindUnit);
+  std::size_t write(const PolygonMesh& mesh, double metres) {
+    const auto known = std::ranges::find(kThreeMfUnits, metres, &std::pair<std::string_view, double>::second);
+    const bool stated = known != std::end(kThreeMfUnits);
+    const double scale = stated || !(metres > 0.0) ? 1.0 : 1000.0 * metres;
+    text(kHeadToUnit).text(stated ? known->first : "millimeter").text(kHeadBehindUnit);
     if (mesh.empty()) {
       text("<resources/>\n<build/>\n</model>\n").flush();
       return 0;
@@ -52,10 +57,11 @@ class ModelWriter {
     });
     text("</triangles></mesh></object>\n</resources>\n<build><item objectid=\"1\"");
     // The origin is the translation of the item, so that readers in single precision lose least of the shape.
-    if (const std::optional<Eigen::Vector3d> origin = stated_origin(mesh)) {
-      text(" transform=\"1 0 0 0 1 0 0 0 1");
-      for (const double x : *origin) text(" ").number(x);
-      text("\"");
+    const std::optional<Eigen::Vector3d> origin = stated_origin(mesh);
+    if (origin || scale != 1.0) {
+      text(" transform=\"");
+      for (int i = 0; i < 9; ++i) number(i % 4 == 0 ? scale : 0.0).text(" ");
+      for (int a = 0; a < 3; ++a) number(origin ? scale * (*origin)[a] : 0.0).text(a < 2 ? " " : "\"");
     }
     text("/></build>\n</model>\n").flush();
     return left_out_;
@@ -87,8 +93,8 @@ class ModelWriter {
 
 }  // namespace
 
-void write_three_mf(const ByteSink& out, const PolygonMesh& mesh, std::string_view unit,
-                    const std::string& file, RunContext& context) {
+void write_three_mf(const ByteSink& out, const PolygonMesh& mesh, double metres, const std::string& file,
+                    RunContext& context) {
   // In the order in which readers look for them: the types of the files, the position of the model, the
   // model.
   ZipWriter archive;
@@ -100,7 +106,7 @@ void write_three_mf(const ByteSink& out, const PolygonMesh& mesh, std::string_vi
   // Bounds of a line: three doubles of 24 characters, three indices of 10.
   archive.begin("3D/3dmodel.model",
                 1000.0 + 110.0 * double(mesh.points.size()) + 70.0 * double(mesh.triangle_count()));
-  const std::size_t left_out = ModelWriter(archive, context).write(mesh, unit);
+  const std::size_t left_out = ModelWriter(archive, context).write(mesh, metres);
   if (left_out > 0)
     context.note(joined(in_quotes(file), ": ", left_out,
                         " triangles with a corner twice were left out, which 3MF forbids"));

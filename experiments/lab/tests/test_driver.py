@@ -339,6 +339,29 @@ class Conform(Runs):
             self.assertEqual([row["threads"] for row in self.rows()], [1, 2, 7])
 
 
+class AppendedRows(unittest.TestCase):
+    def test_a_full_disk_leaves_no_half_of_a_row(self):
+        write = os.write
+        with tempfile.TemporaryDirectory() as directory:
+            file = pathlib.Path(directory, "rows.jsonl")
+            append_rows(file, [{"case": 1}])
+            before = file.read_bytes()
+            with mock.patch("os.write", lambda to, data: write(to, data[:5])):
+                with self.assertRaisesRegex(LabError, "full"):
+                    append_rows(file, [{"case": 2}])
+            self.assertEqual(file.read_bytes(), before)
+
+            def interrupted(to, data):  # by a row of another run
+                written = write(to, data[:5])
+                with open(file, "ab") as other:
+                    other.write(b"{}\n")
+                return written
+
+            with mock.patch("os.write", interrupted), self.assertRaises(LabError):
+                append_rows(file, [{"case": 2}])
+            self.assertTrue(file.read_bytes().endswith(b"{}\n"))
+
+
 class Provenance(unittest.TestCase):
     def test_kept_rows_need_a_clean_commit(self):
         for state, dirty, is_fine in ((("a", False), False, True), (("a", True), False, False),

@@ -45,6 +45,15 @@ class Merge(unittest.TestCase):
         merge.merge_shards(out, shards or self.shards, io.StringIO())
         return read_rows(out)
 
+    def test_a_full_disk_leaves_no_half_of_a_mesh(self):
+        def half(source, target):
+            pathlib.Path(target).write_text("p")
+            raise OSError("the disk is full")
+
+        with mock.patch("shutil.copy2", half), self.assertRaises(shutil.Error):
+            self.merged()
+        self.assertEqual(list((self.root / "merged").rglob("*.ply")), [])
+
     def assert_refused(self, part, shards=None):
         with self.assertRaisesRegex(LabError, part):
             self.merged(shards)

@@ -1,31 +1,51 @@
 """Polygons to sparse volumes and back.
 
-    import hermesh
-    mesh = hermesh.remesh("scan.ply", resolution=400, tolerance=0.05)
-    mesh.points, mesh.triangles, mesh.quads        # numpy arrays, not copies
-
 Options have the names, defaults and ranges of the program `hermesh`, with `_` for `-`, and results have the
 bytes that it writes for the same options, at any number of threads. Other keywords are options of the method
-(`-o` of the program), such as `tolerance` above; `extractors()` and `voxelizers()` list them.
+(`-o` of the program), such as `tolerance` below; `extractors()` and `voxelizers()` list them.
 
 A mesh parameter accepts a `Mesh`, the path of a file, an object with `.vertices` and `.faces` (trimesh) or
 with `.points` and `.cells_dict` (meshio), or a tuple (points, polygons) or (points, triangles, quads) of
 arrays.
 
 Each function takes
-    progress  a callable of the name of a stage and its completed share, 0 to 1; an exception that it raises
-              ends the work
-    cancel    an object with is_set(), such as a threading.Event: the work ends with `Cancelled` when it is
-              set
-    threads   maximum number of threads (default: all of the machine)
-    log       a `Log`, which receives notes, times and statistics; without one the notes are warnings of
-              the category `Note`
+
+progress
+    a callable of the name of a stage and its completed share, 0 to 1; an exception that it raises ends the
+    work
+cancel
+    an object with is_set(), such as a threading.Event: the work ends with `Cancelled` when it is set
+threads
+    maximum number of threads (default: all of the machine)
+log
+    a `Log`, which receives notes, times and statistics; without one the notes are warnings of the category
+    `Note`
+
 Ctrl-C ends the work. Other Python threads run meanwhile.
+
+Examples
+--------
+A cube of quads, which the examples of the functions use, too:
+
+>>> import numpy as np
+>>> import hermesh
+>>> points = np.array([[i & 1, i >> 1 & 1, i >> 2 & 1] for i in range(8)], float)
+>>> quads = np.array([[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]])
+>>> cube = points, quads
+
+A mesh of few triangles, whose arrays are numpy arrays without a copy:
+
+>>> mesh = hermesh.remesh(cube, resolution=20, tolerance=0.05)
+>>> mesh
+<hermesh.Mesh of 8 points, 12 triangles, 0 quads>
+>>> mesh.points.shape, mesh.points.dtype
+((8, 3), dtype('float32'))
 """
 
 from __future__ import annotations
 
 import os
+import re
 import tempfile
 import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -61,14 +81,39 @@ OptionValue = Union[str, int, float, bool]
 
 
 class Note(UserWarning):
-    """A warning, such as the share of a surface that is thinner than a voxel."""
+    """A warning, such as the share of a surface that is thinner than a voxel.
+
+    Examples
+    --------
+    Notes can be made errors, like all warnings:
+
+    >>> import warnings
+    >>> with warnings.catch_warnings():
+    ...     warnings.simplefilter("error", hermesh.Note)
+    ...     mesh = hermesh.remesh(cube, resolution=20)
+    """
 
 
 class Log:
     """Notes and statistics; each call with the log adds to it.
 
-    notes: warnings. stage_seconds: (stage, seconds) in the order of their ends. figures: name to number, such
-    as `lost_surface_share`.
+    Attributes
+    ----------
+    notes : list of str
+        Warnings.
+    stage_seconds : list of (str, float)
+        Stages with their seconds, in the order of their ends.
+    figures : dict of str to float
+        Statistics by name, such as `lost_surface_share`.
+
+    Examples
+    --------
+    >>> log = hermesh.Log()
+    >>> volume = hermesh.voxelize(cube, resolution=20, log=log)
+    >>> log.notes
+    []
+    >>> log.figures["lost_surface_share"]
+    0.0
     """
 
     def __init__(self) -> None:
@@ -77,8 +122,24 @@ class Log:
         self.figures: dict[str, float] = {}
 
 
+_SWITCHES = "except-thin|over-holes|through-volume"
+_VALUES = "auto|closed|drop|dual-contouring|flood-fill|keep|open|refuse|unsigned|winding-number"
+
+
+def _in_python(message: str) -> str:
+    """Returns a message with options of the command line replaced by keyword arguments."""
+    named = lambda name: name.replace("-", "_")
+    message = re.sub(r"(?<![\w-])-o ([a-z][a-z-]*)=([a-z-]+|[\d.]+)",
+                     lambda m: f'{named(m[1])}={m[2] if m[2][0].isdigit() else repr(m[2])}', message)
+    message = re.sub(f"(?<![\\w-])--({_SWITCHES})(?![\\w-])", lambda m: named(m[1]) + "=True", message)
+    message = re.sub(f"(?<![\\w-])--([a-z][a-z-]*) ({_VALUES})(?![\\w-])",
+                     lambda m: f"{named(m[1])}={m[2]!r}", message)
+    return re.sub(r"(?<![\w-])--([a-z][a-z-]*[a-z])( VALUE| N(?= ))?", lambda m: named(m[1]), message)
+
+
 class _Watching:
-    """Provides the watch of a call, and passes its notes to the caller even if the call raises."""
+    """Provides the watch of a call, and passes its notes to the caller even if the call raises. Notes and
+    errors name options as Python does."""
 
     def __init__(self, progress: Progress | None, cancel: _IsSet | None, threads: int | None,
                  log: Log | None) -> None:
@@ -90,13 +151,16 @@ class _Watching:
     def __enter__(self) -> _core.Watch:
         return self._watch
 
-    def __exit__(self, *_: object) -> None:
+    def __exit__(self, kind: object, error: BaseException | None, trace: object) -> None:
+        if isinstance(error, Error):
+            error.args = tuple(_in_python(str(argument)) for argument in error.args)
+        notes = [_in_python(note) for note in self._watch.notes]
         if self._log is None:
-            for note in self._watch.notes:
+            for note in notes:
                 # The line that called the public function is three frames up.
                 warnings.warn(note, Note, stacklevel=3)
             return
-        self._log.notes += self._watch.notes
+        self._log.notes += notes
         self._log.stage_seconds += self._watch.stage_seconds
         self._log.figures.update(self._watch.figures)
 
@@ -105,10 +169,31 @@ class _Watching:
 
 
 def as_mesh(mesh: MeshLike, *, attributes: bool = False) -> Mesh:
-    """Converts a mesh parameter to a `Mesh`; see the module.
+    """Converts a mesh parameter to a `Mesh`.
 
-    With `attributes` those of files, trimesh and meshio objects are converted, too. Raises Error for an
-    invalid mesh of triangles and quads, and TypeError for another kind of object.
+    Parameters
+    ----------
+    mesh : MeshLike
+        A `Mesh`, a path, an object of trimesh or meshio, or a tuple of arrays; see the module `hermesh`.
+    attributes : bool, default False
+        True to convert the attributes of files and of objects of trimesh and meshio, too.
+
+    Returns
+    -------
+    Mesh
+        The argument itself if it is a `Mesh`.
+
+    Raises
+    ------
+    Error
+        If the mesh is invalid.
+    TypeError
+        If the object is of another kind.
+
+    Examples
+    --------
+    >>> hermesh.as_mesh(cube)
+    <hermesh.Mesh of 8 points, 0 triangles, 6 quads>
     """
     if isinstance(mesh, Mesh):
         return mesh
@@ -160,14 +245,35 @@ def _of_meshio(mesh: Any, attributes: bool) -> Mesh:
 
 
 def to_trimesh(mesh: Mesh) -> Any:
-    """Returns a trimesh.Trimesh of the mesh in world units, with quads split along their intended diagonals.
-    Needs the package trimesh."""
+    """Converts a mesh to a trimesh.Trimesh in world units; needs the package trimesh.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        Its quads are split along their intended diagonals.
+
+    Returns
+    -------
+    trimesh.Trimesh
+        With the same vertices; trimesh does not merge or reorder them.
+    """
     import trimesh
     return trimesh.Trimesh(mesh.world_points(), mesh.triangulated(), process=False)
 
 
 def to_meshio(mesh: Mesh) -> Any:
-    """Returns a meshio.Mesh of the mesh in world units, with point attributes. Needs the package meshio."""
+    """Converts a mesh to a meshio.Mesh in world units; needs the package meshio.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        Attributes of its points are converted, others not.
+
+    Returns
+    -------
+    meshio.Mesh
+        With cells `triangle` and `quad`.
+    """
     import meshio
     cells = [(kind, array) for kind, array in (("triangle", mesh.triangles), ("quad", mesh.quads))
              if len(array)]
@@ -176,11 +282,38 @@ def to_meshio(mesh: Mesh) -> Any:
 
 def read_mesh(path: str | os.PathLike[str], *, attributes: bool = False, progress: Progress | None = None,
               cancel: _IsSet | None = None, threads: int | None = None, log: Log | None = None) -> Mesh:
-    """Reads PLY, OBJ, OFF, STL, glTF 2.0 or 3MF, each also gzipped; polygons of more corners are split into
-    triangles.
+    """Reads a mesh file: PLY, OBJ, OFF, STL, glTF 2.0 or 3MF, each also gzipped.
 
-    With `attributes` those of PLY and OBJ are read, too. Raises Error for a file that is missing, damaged, of
-    another type or without polygons. Adds a note for each tolerated fault.
+    Polygons of more than four corners are split into triangles.
+
+    Parameters
+    ----------
+    path : path-like
+        The extension of the name specifies the format.
+    attributes : bool, default False
+        True to read the attributes of PLY and OBJ files, too.
+    progress, cancel, threads, log : optional
+        See the module `hermesh`.
+
+    Returns
+    -------
+    Mesh
+        With a note for each tolerated error in the file.
+
+    Raises
+    ------
+    Error
+        If the file is missing, damaged, of another format, or has no polygons.
+
+    Examples
+    --------
+    >>> hermesh.write_mesh("cube.ply", cube)
+    >>> hermesh.read_mesh("cube.ply")
+    <hermesh.Mesh of 8 points, 0 triangles, 6 quads>
+    >>> hermesh.read_mesh("absent.ply")
+    Traceback (most recent call last):
+        ...
+    hermesh.Error: 'absent.ply' cannot be read: there is no such file
     """
     with _Watching(progress, cancel, threads, log) as watch:
         return _core.read_mesh(os.fspath(path), attributes, watch)
@@ -188,11 +321,26 @@ def read_mesh(path: str | os.PathLike[str], *, attributes: bool = False, progres
 
 def write_mesh(path: str | os.PathLike[str], mesh: MeshLike, *, progress: Progress | None = None,
                cancel: _IsSet | None = None, threads: int | None = None, log: Log | None = None) -> None:
-    """Writes PLY (binary, with attributes), OBJ, OFF, STL, glTF (.glb, .gltf) or 3MF, by the extension of
-    the name, atomically.
+    """Writes a mesh file: PLY, OBJ, OFF, STL, glTF (.glb, .gltf) or 3MF.
 
-    Raises Error for an unknown extension or a path that cannot be written. STL has single precision; a note
-    gives the loss.
+    Parameters
+    ----------
+    path : path-like
+        The extension of the name specifies the format. An existing file is replaced once the new one is
+        complete.
+    mesh : MeshLike
+        PLY (binary) stores its attributes; STL has single precision, and a note states the loss.
+    progress, cancel, threads, log : optional
+        See the module `hermesh`.
+
+    Raises
+    ------
+    Error
+        If the extension is unknown or the path cannot be written.
+
+    Examples
+    --------
+    >>> hermesh.write_mesh("cube.stl", cube)
     """
     mesh = as_mesh(mesh, attributes=True)
     with _Watching(progress, cancel, threads, log) as watch:
@@ -204,9 +352,34 @@ def write_mesh(path: str | os.PathLike[str], mesh: MeshLike, *, progress: Progre
 
 def read_vdb(path: str | os.PathLike[str], *, grid: str = "", progress: Progress | None = None,
              cancel: _IsSet | None = None, threads: int | None = None, log: Log | None = None) -> Volume:
-    """Reads a scalar grid of a .vdb file: the named one, else `sdf`, else the only one.
+    """Reads a scalar grid of a .vdb file.
 
-    Raises Error for a file that is missing or damaged, and a grid that is missing or not scalar.
+    Parameters
+    ----------
+    path : path-like
+        A file of OpenVDB.
+    grid : str, optional
+        The name of the grid. By default `sdf`, else the only scalar grid.
+    progress, cancel, threads, log : optional
+        See the module `hermesh`.
+
+    Returns
+    -------
+    Volume
+        Half and double precision, integers, bool and masks become single precision.
+
+    Raises
+    ------
+    Error
+        If the file is missing or damaged, or the grid is missing or not scalar.
+
+    Examples
+    --------
+    >>> hermesh.write_vdb("cube.vdb", hermesh.voxelize(cube, resolution=20))
+    >>> hermesh.grid_names("cube.vdb")
+    ['sdf']
+    >>> hermesh.read_vdb("cube.vdb").is_level_set
+    True
     """
     with _Watching(progress, cancel, threads, log) as watch:
         return _core.read_vdb(os.fspath(path), grid, watch)
@@ -215,9 +388,28 @@ def read_vdb(path: str | os.PathLike[str], *, grid: str = "", progress: Progress
 def write_vdb(path: str | os.PathLike[str], volumes: Volume | Iterable[Volume], *,
               progress: Progress | None = None, cancel: _IsSet | None = None, threads: int | None = None,
               log: Log | None = None) -> None:
-    """Writes the volumes as the grids of one .vdb file, by their names. The same volumes give the same bytes.
+    """Writes volumes as the grids of one .vdb file. The same volumes give the same bytes.
 
-    Raises Error for a path that cannot be written and for two volumes of one name.
+    Parameters
+    ----------
+    path : path-like
+        An existing file is replaced once the new one is complete.
+    volumes : Volume or iterable of Volume
+        The grids have the names of the volumes.
+    progress, cancel, threads, log : optional
+        See the module `hermesh`.
+
+    Raises
+    ------
+    Error
+        If the path cannot be written, or two volumes have the same name.
+
+    Examples
+    --------
+    >>> grids = hermesh.voxelize_grids(cube, "sdf,fog", resolution=20)
+    >>> hermesh.write_vdb("cube.vdb", grids)
+    >>> sorted(hermesh.grid_names("cube.vdb"))
+    ['fog', 'sdf']
     """
     several = [volumes] if isinstance(volumes, Volume) else list(volumes)
     with _Watching(progress, cancel, threads, log) as watch:
@@ -225,8 +417,20 @@ def write_vdb(path: str | os.PathLike[str], volumes: Volume | Iterable[Volume], 
 
 
 def to_pyopenvdb(volume: Volume) -> Any:
-    """Converts the volume to a grid of the module pyopenvdb (Debian: python3-openvdb) through a file, without
-    changes."""
+    """Converts a volume to a grid of the module pyopenvdb (Debian: python3-openvdb).
+
+    The conversion is through a temporary file, because the two modules may have different OpenVDB libraries.
+
+    Parameters
+    ----------
+    volume : Volume
+        The grid has its name, or `volume`.
+
+    Returns
+    -------
+    pyopenvdb.GridBase
+        With the same values.
+    """
     import pyopenvdb
     with tempfile.TemporaryDirectory() as folder:
         path = os.path.join(folder, "volume.vdb")
@@ -236,7 +440,18 @@ def to_pyopenvdb(volume: Volume) -> Any:
 
 
 def from_pyopenvdb(grid: Any) -> Volume:
-    """Converts a scalar grid of the module pyopenvdb to a volume through a file."""
+    """Converts a grid of the module pyopenvdb to a volume, through a temporary file.
+
+    Parameters
+    ----------
+    grid : pyopenvdb.GridBase
+        A scalar grid.
+
+    Returns
+    -------
+    Volume
+        With the name of the grid.
+    """
     import pyopenvdb
     with tempfile.TemporaryDirectory() as folder:
         path = os.path.join(folder, "volume.vdb")
@@ -249,16 +464,44 @@ def import_volume(path: str | os.PathLike[str], *, frame: int | None = None,
                   offset: int | None = None, replace_nan: float | None = None,
                   progress: Progress | None = None, cancel: _IsSet | None = None, threads: int | None = None,
                   log: Log | None = None) -> Volume:
-    """Imports a CT or MRI (NIfTI-1: .nii, .hdr, .img), or with `dims` raw samples; all also gzipped.
+    """Imports a CT or MRI volume: NIfTI-1 (.nii, .hdr, .img) or raw samples, also gzipped.
 
-    frame: index of the volume in a NIfTI file, from 0.
-    dims, type, spacing, offset: of raw samples: their numbers along x (fastest in the file), y and z; uint8,
-        int8, uint16, int16, uint32, int32, uint64, int64, float32 or float64, followed by le (default) or be;
-        their distances in mm; bytes before the first.
-    replace_nan: the value that replaces samples that are not finite, which are otherwise an error.
+    Parameters
+    ----------
+    path : path-like
+        The file.
+    frame : int, optional
+        Index of the volume in a NIfTI file, from 0. By default the first.
+    dims : sequence of three int, optional
+        For raw samples: their numbers along x (fastest in the file), y and z. By default the file is NIfTI-1.
+    type : str, optional
+        For raw samples: uint8, int8, uint16, int16, uint32, int32, uint64, int64, float32 or float64,
+        followed by le (default) or be.
+    spacing : sequence of three float, default (1, 1, 1)
+        For raw samples: their distances in millimetres.
+    offset : int, default 0
+        For raw samples: bytes before the first.
+    replace_nan : float, optional
+        Replaces samples that are not finite, which are an error by default.
+    progress, cancel, threads, log : optional
+        See the module `hermesh`.
 
-    Returns the volume `volume`, in millimetres, with all samples active. Raises Error for a file that is
-    missing, damaged or of another kind or size than specified.
+    Returns
+    -------
+    Volume
+        Named `volume`, in millimetres, with all samples active.
+
+    Raises
+    ------
+    Error
+        If the file is missing, damaged, or of another kind or size than specified.
+
+    Examples
+    --------
+    >>> np.arange(24, dtype=np.int16).tofile("ct.raw")
+    >>> volume = hermesh.import_volume("ct.raw", dims=(2, 3, 4), type="int16", spacing=(0.5, 0.5, 2))
+    >>> volume.dims, volume.value_range
+    ((2, 3, 4), (0.0, 23.0))
     """
     with _Watching(progress, cancel, threads, log) as watch:
         return _core.import_volume(os.fspath(path), frame, None if dims is None else list(dims), type,
@@ -321,17 +564,50 @@ def voxelize(mesh: MeshLike, *, resolution: int | None = None, voxel_size: float
              voxelizer: str = "hermesh", signs: str | None = None, progress: Progress | None = None,
              cancel: _IsSet | None = None, threads: int | None = None, log: Log | None = None,
              **voxelizer_options: OptionValue) -> Volume:
-    """Returns the level set `sdf` of any polygons, closed or not (`udf`, without signs, for
-    signs="unsigned").
+    """Converts polygons, closed or not, to a level set.
 
-    resolution: voxels along the longest side of the mesh; or
-    voxel_size: edge of a voxel, world units; or
-    like: a volume; the new one shares its lattice.
-    exterior_band, interior_band: widths of the bands outside and inside, in voxels, at least 1.
-    voxelizer, signs, and options of the voxelizer: see voxelizers().
+    Exactly one of `resolution`, `voxel_size` and `like` is required.
 
-    Raises Error for a mesh without polygons or extent, a size that does not fit in memory, and unknown
-    options. Adds a note if surface is lost between the samples.
+    Parameters
+    ----------
+    mesh : MeshLike
+        Any polygons.
+    resolution : int, optional
+        Voxels along the longest side of the mesh.
+    voxel_size : float, optional
+        Edge of a voxel, world units.
+    like : Volume, optional
+        The result has the lattice of this volume.
+    exterior_band, interior_band : float, default 3.0
+        Widths of the narrow bands outside and inside, in voxels, at least 1.
+    voxelizer : str, default "hermesh"
+        One of `voxelizers()`.
+    signs : str, default "auto"
+        How the inside is found: "auto", "flood-fill", "winding-number", or "unsigned" for distances without
+        sign.
+    progress, cancel, threads, log : optional
+        See the module `hermesh`.
+    **voxelizer_options
+        Options of the voxelizer.
+
+    Returns
+    -------
+    Volume
+        The level set `sdf`, or `udf` for `signs="unsigned"`. A note states the share of the surface that is
+        lost between the samples.
+
+    Raises
+    ------
+    Error
+        If the mesh has no polygons or no extent, the volume does not fit in memory, or an option is unknown.
+
+    Examples
+    --------
+    >>> volume = hermesh.voxelize(cube, voxel_size=0.1)
+    >>> volume.name, round(volume.voxel_size, 3)
+    ('sdf', 0.1)
+    >>> np.round(volume.sample([[1.15, 0.5, 0.5], [0.95, 0.5, 0.5]]), 3)
+    array([ 0.15, -0.05], dtype=float32)
     """
     options = _voxelizing(resolution=resolution, voxel_size=voxel_size, like=like,
                           exterior_band=exterior_band, interior_band=interior_band, voxelizer=voxelizer,
@@ -347,11 +623,38 @@ def voxelize_grids(mesh: MeshLike, grids: str | Iterable[str], *, fog_exterior: 
                    signs: str | None = None, progress: Progress | None = None, cancel: _IsSet | None = None,
                    threads: int | None = None, log: Log | None = None,
                    **voxelizer_options: OptionValue) -> list[Volume]:
-    """Returns several volumes of one voxelization, in the order of the program's file: sdf, udf, fog,
-    closest-point, triangle-id, attributes, attribute:NAME, separated by commas or as a list.
+    """Returns several volumes of one voxelization.
 
-    fog_exterior: True if the fog's ramp covers both bands, not only the interior one. The others as in
-        voxelize().
+    Parameters
+    ----------
+    mesh : MeshLike
+        Any polygons.
+    grids : str or iterable of str
+        Names, as a list or separated by commas: sdf, udf, fog, closest-point, triangle-id, attributes,
+        attribute:NAME.
+    fog_exterior : bool, default False
+        True if the ramp of the fog covers both bands instead of the interior one.
+    resolution, voxel_size, like, exterior_band, interior_band, voxelizer, signs : optional
+        As in `voxelize`.
+    progress, cancel, threads, log : optional
+        See the module `hermesh`.
+    **voxelizer_options
+        Options of the voxelizer.
+
+    Returns
+    -------
+    list of Volume
+        In the order of the program's file, not in that of `grids`.
+
+    Raises
+    ------
+    Error
+        As `voxelize`, and if a name is unknown.
+
+    Examples
+    --------
+    >>> [volume.name for volume in hermesh.voxelize_grids(cube, ["fog", "sdf"], resolution=20)]
+    ['sdf', 'fog']
     """
     options = _voxelizing(resolution=resolution, voxel_size=voxel_size, like=like,
                           exterior_band=exterior_band, interior_band=interior_band, voxelizer=voxelizer,
@@ -370,18 +673,55 @@ def extract(volume: Volume, *, extractor: str = "dual-contouring", isovalue: flo
             log: Log | None = None, **options: OptionValue) -> Mesh:
     """Extracts the surface of a volume.
 
-    extractor, and options of it: see extractors().
-    isovalue: value of the surface, in the units of the volume.
-    source: the polygons that the volume was made from, for extractors that use exact crossings.
-    ends: where the surface reaches the end of the data: "closed" with a flat cap, or "open".
-    mask: where an adaptive extractor observes its bound: where a level set is negative, where any other
-        volume differs from its background; or
-    frustum: the view of a camera, with frustum_resolution voxels along its longest side.
-    outside: outside the mask: "simplify", "nothing" (no polygons) or "everywhere" (the bound).
-    tolerance_grid: a volume whose values, none negative, scale the bound.
-    written_in_single: True if the mesh goes into an STL file: guarantees then hold for the written mesh.
+    Parameters
+    ----------
+    volume : Volume
+        A level set, fog, or a CT or MRI.
+    extractor : str, default "dual-contouring"
+        One of `extractors()`.
+    isovalue : float, default 0.0
+        Value of the surface, in the units of the volume.
+    source : MeshLike, optional
+        The polygons that the volume was made from, for extractors that use exact edge crossings.
+    ends : str, default "closed"
+        Where the surface reaches the end of the data: "closed" with a flat cap, or "open".
+    mask : Volume, optional
+        Where an adaptive extractor observes its bound: where a level set is negative, or where another volume
+        differs from its background. By default everywhere. Not with `frustum`.
+    frustum : Frustum, optional
+        The view of a camera as mask.
+    frustum_resolution : int, default 84
+        Voxels along the longest side of the mask of `frustum`.
+    outside : str, default "simplify"
+        Outside of the mask: "simplify", "nothing" (no polygons) or "everywhere" (the bound).
+    tolerance_grid : Volume, optional
+        Its values, none negative, scale the bound.
+    written_in_single : bool, default False
+        True if the mesh will be written to an STL file: guarantees then hold for the written mesh.
+    progress, cancel, threads, log : optional
+        See the module `hermesh`.
+    **options
+        Options of the extractor.
 
-    Raises Error if there is no surface, for unknown options, and for options without effect.
+    Returns
+    -------
+    Mesh
+        With the guarantees that `extractors()` lists.
+
+    Raises
+    ------
+    Error
+        If the volume has no surface at the isovalue, an option is unknown, or an option has no effect.
+
+    Examples
+    --------
+    >>> volume = hermesh.voxelize(cube, resolution=20)
+    >>> hermesh.extract(volume, extractor="manifold-dual-contouring", tolerance=0.1)  # doctest: +ELLIPSIS
+    <hermesh.Mesh of ... points, ... triangles, 0 quads>
+    >>> hermesh.extract(volume, isovalue=5)  # doctest: +IGNORE_EXCEPTION_DETAIL
+    Traceback (most recent call last):
+        ...
+    hermesh.Error: the level set has no surface at the isovalue 5
     """
     chosen = _extracting(options, extractor=extractor, isovalue=isovalue, ends=ends, mask=mask,
                          frustum=frustum, frustum_resolution=frustum_resolution, outside=outside,
@@ -392,23 +732,113 @@ def extract(volume: Volume, *, extractor: str = "dual-contouring", isovalue: flo
 
 
 def remesh(mesh: MeshLike, *, resolution: int | None = None, voxel_size: float | None = None,
-           exterior_band: float = 3.0, interior_band: float = 3.0, voxelizer: str = "hermesh",
-           signs: str | None = None, voxelizer_options: Mapping[str, OptionValue] | None = None,
-           thin: str | None = None,
+           error: float | None = None, triangles: int | None = None, exterior_band: float = 3.0,
+           interior_band: float = 3.0, voxelizer: str = "hermesh", signs: str | None = None,
+           voxelizer_options: Mapping[str, OptionValue] | None = None, thin: str | None = None,
            extractor: str = "manifold-dual-contouring", isovalue: float = 0.0, mask: Volume | None = None,
            frustum: Frustum | None = None, frustum_resolution: int = 84, outside: str = "simplify",
            tolerance_grid: Volume | None = None, written_in_single: bool = False,
            progress: Progress | None = None, cancel: _IsSet | None = None, threads: int | None = None,
            log: Log | None = None, **options: OptionValue) -> Mesh:
-    """Converts polygons to a level set and back to a mesh: by default adaptive within tolerance=0.1 voxels,
-    closed, manifold and free of self-intersection.
+    """Converts polygons to a watertight mesh, through a level set with a given size of voxels.
 
-    resolution or voxel_size (world units), bands, voxelizer: as in voxelize(), with the voxelizer's options
-    in a dict. extractor and the others: as in extract().
-    thin: walls, wires and open sheets thinner than the voxels: "keep" thickens them until they appear, with a
-        note, "drop" loses them, with a note, and "refuse" raises Error; None keeps them where possible, i.e.
-        with the voxelizer hermesh, signs and the isovalue 0.
+    By default the mesh is adaptive, within `tolerance=0.1` voxels of the uniform mesh, closed, manifold and
+    free of self-intersections. Exactly one of `resolution`, `voxel_size`, `error` and `triangles` is
+    required.
+
+    Parameters
+    ----------
+    mesh : MeshLike
+        Any polygons.
+    resolution : int, optional
+        Voxels along the longest side of the mesh.
+    voxel_size : float, optional
+        Edge of a voxel, world units.
+    error : float, optional
+        Maximum two-sided distance from the boundary of the polygons' solid, world units, which is certified.
+        The method is chosen for it, so only `signs`, `thin` and `written_in_single` have an effect.
+        `remesh_within` has more options and returns the certified distances.
+    triangles : int, optional
+        Maximum number of triangles, with the smallest certified error found; as `error`.
+    exterior_band, interior_band : float, default 3.0
+        Widths of the narrow bands outside and inside, in voxels, at least 1.
+    voxelizer : str, default "hermesh"
+        One of `voxelizers()`.
+    signs : str, default "auto"
+        How the inside is found: "auto" (in the form "auto-sheets" if thin parts are kept), "flood-fill",
+        "winding-number" (default with `error` and `triangles`), or "unsigned".
+    voxelizer_options : dict, optional
+        Options of the voxelizer.
+    thin : str, default "keep"
+        Walls, wires and open sheets thinner than the voxels: "keep" thickens them, with a note, "drop" loses
+        them, with a note, and "refuse" raises `Error`. By default they are kept where possible, i.e. with the
+        voxelizer hermesh, signs and the isovalue 0.
+    extractor : str, default "manifold-dual-contouring"
+        One of `extractors()`.
+    isovalue : float, default 0.0
+        Value of the surface, in the units of the volume.
+    mask : Volume, optional
+        Where an adaptive extractor observes its bound: where a level set is negative, or where another volume
+        differs from its background. By default everywhere. Not with `frustum`.
+    frustum : Frustum, optional
+        The view of a camera as mask.
+    frustum_resolution : int, default 84
+        Voxels along the longest side of the mask of `frustum`.
+    outside : str, default "simplify"
+        Outside of the mask: "simplify", "nothing" (no polygons) or "everywhere" (the bound).
+    tolerance_grid : Volume, optional
+        Its values, none negative, scale the bound.
+    written_in_single : bool, default False
+        True if the mesh will be written to an STL file: guarantees then hold for the written mesh.
+    progress, cancel, threads, log : optional
+        See the module `hermesh`.
+    **options
+        Options of the extractor, such as `tolerance`.
+
+    Returns
+    -------
+    Mesh
+        With the guarantees that `extractors()` lists. With `error` or `triangles` a `Log` has the certified
+        distances in `figures`.
+
+    Raises
+    ------
+    Error
+        As `voxelize` and `extract`, and if a requested error cannot be certified.
+
+    See Also
+    --------
+    remesh_within : returns the certified distances, too.
+
+    Examples
+    --------
+    >>> hermesh.remesh(cube, resolution=20)
+    <hermesh.Mesh of 8 points, 12 triangles, 0 quads>
+    >>> log = hermesh.Log()
+    >>> hermesh.remesh(cube, error=0.01, log=log)
+    <hermesh.Mesh of 8 points, 12 triangles, 0 quads>
+    >>> log.figures["certified_to_polygons"] <= 0.01
+    True
+    >>> hermesh.remesh(cube, error=0.01, resolution=20)
+    Traceback (most recent call last):
+        ...
+    hermesh.Error: resolution has no effect with error or triangles, which choose the method
     """
+    if error is not None or triangles is not None:
+        idle = [("resolution", resolution, None), ("voxel_size", voxel_size, None),
+                ("exterior_band", exterior_band, 3.0), ("interior_band", interior_band, 3.0),
+                ("voxelizer", voxelizer, "hermesh"), ("voxelizer_options", voxelizer_options, None),
+                ("extractor", extractor, "manifold-dual-contouring"), ("isovalue", isovalue, 0.0),
+                ("mask", mask, None), ("frustum", frustum, None),
+                ("frustum_resolution", frustum_resolution, 84), ("outside", outside, "simplify"),
+                ("tolerance_grid", tolerance_grid, None)] + [(name, True, False) for name in options]
+        for name, value, default in idle:
+            if value is not default and value != default:
+                raise Error(f"{name} has no effect with error or triangles, which choose the method")
+        mesh = as_mesh(mesh)
+        with _Watching(progress, cancel, threads, log) as watch:
+            return _within(watch, log, mesh, error=error, triangles=triangles, thin=thin or "keep",
+                           signs=signs or "winding-number", written_in_single=written_in_single).mesh
     voxelizing = _voxelizing(resolution=resolution, voxel_size=voxel_size, exterior_band=exterior_band,
                              interior_band=interior_band, voxelizer=voxelizer, signs=signs,
                              voxelizer_options=voxelizer_options, thin=_thin(thin))
@@ -421,7 +851,21 @@ def remesh(mesh: MeshLike, *, resolution: int | None = None, voxel_size: float |
 
 
 class ExceptedBall(NamedTuple):
-    """A ball within which a bound may not hold, world units."""
+    """A ball within which a bound may not hold, world units.
+
+    Attributes
+    ----------
+    position : list of float
+        The centre.
+    radius : float
+        The radius.
+    distance : float
+        Lower bound of the distance between mesh and polygons at the position.
+    area : float
+        Area of the parts of polygons and mesh in the ball that are not shown to be near.
+    is_hole : bool
+        True if the mesh closes a hole there; otherwise a wall or gap is too thin.
+    """
     position: list[float]
     radius: float
     distance: float  # lower bound of the distance between mesh and polygons at the position
@@ -430,7 +874,23 @@ class ExceptedBall(NamedTuple):
 
 
 class BoundedRemesh(NamedTuple):
-    """A mesh with its certified distances, world units."""
+    """A mesh with its certified distances, world units.
+
+    Attributes
+    ----------
+    mesh : Mesh
+        The mesh.
+    error : float
+        The requested error or, for a maximum number of triangles, the one found.
+    to_polygons : float
+        Bound of the distance from the mesh to the boundary of the polygons' solid.
+    from_polygons : float
+        Bound of the distance from that boundary to the mesh.
+    voxel_size : float
+        Of the volume; 0 if none was made.
+    exceptions : list of ExceptedBall
+        With `except_thin`, balls outside of which the bounds hold.
+    """
     mesh: Mesh
     error: float  # the requested one or, for a budget, the one found
     to_polygons: float  # bound of the distance from the mesh to the boundary of the polygons' solid
@@ -441,27 +901,82 @@ class BoundedRemesh(NamedTuple):
 
 def remesh_within(mesh: MeshLike, *, error: float | None = None, triangles: int | None = None,
                   signs: str = "winding-number", over_holes: bool = False, smallest_voxel: float = 0.0,
-                  limit_points: float = 3e7, written_in_single: bool = False, thin: str = "keep",
+                  limit_points: float | None = None, written_in_single: bool = False, thin: str = "keep",
                   except_thin: bool = False, through_volume: bool = False,
                   progress: Progress | None = None, cancel: _IsSet | None = None,
                   threads: int | None = None, log: Log | None = None) -> BoundedRemesh:
-    """Returns a mesh with a certified two-sided distance of at most `error` (world units) to the boundary of
-    the polygons' solid, or with at most `triangles` and the smallest certified error found. Closed, manifold
-    and free of self-intersection.
+    """Returns a mesh with a certified two-sided distance from the polygons.
 
-    over_holes allows it to close holes where no polygon is near. smallest_voxel (world units, 0 for an eighth
-    of the error) and limit_points limit the work; beyond them the function raises hermesh.Error with location
-    and reason. thin is as in remesh(); with "drop" and "refuse" a part that is too thin is an error.
-    except_thin lets the bound hold except in the balls of `exceptions`, around such parts and holes, with a
-    note, instead of raising an error. A mesh that is closed, manifold and free of self-intersection is
-    simplified itself, without a volume, unless through_volume is set.
+    The distance is that to the boundary of the polygons' solid. The mesh is closed, manifold and free of
+    self-intersections. Exactly one of `error` and `triangles` is required.
+
+    Parameters
+    ----------
+    mesh : MeshLike
+        Any polygons. A mesh that is closed, manifold and free of self-intersections is simplified itself,
+        without a volume, unless `through_volume` is set.
+    error : float, optional
+        Maximum two-sided distance, world units.
+    triangles : int, optional
+        Maximum number of triangles, at least 4; the mesh has the smallest certified error found.
+    signs : str, default "winding-number"
+        How the inside is found; or "flood-fill" or "auto".
+    over_holes : bool, default False
+        True to allow the mesh to close holes where no polygon is near.
+    smallest_voxel : float, default 0.0
+        Smallest voxel size to try, world units; 0: an eighth of the error.
+    limit_points : float, optional
+        Maximum number of vertices of the finest mesh. By default 3e7 with `error`, 4e5 with `triangles`.
+    written_in_single : bool, default False
+        As in `remesh`.
+    thin : str, default "keep"
+        As in `remesh`; with "drop" and "refuse" a part that is too thin is an error.
+    except_thin : bool, default False
+        True to let the bound hold except in the balls of `exceptions`, around holes and parts that are too
+        thin, with a note, instead of raising an error.
+    through_volume : bool, default False
+        True to make a volume of every mesh.
+    progress, cancel, threads, log : optional
+        See the module `hermesh`.
+
+    Returns
+    -------
+    BoundedRemesh
+        The mesh and its certified distances.
+
+    Raises
+    ------
+    Error
+        If the bound cannot be reached within the limits, with the location and the reason.
+
+    Examples
+    --------
+    >>> made = hermesh.remesh_within(cube, error=0.01)
+    >>> made.mesh
+    <hermesh.Mesh of 8 points, 12 triangles, 0 quads>
+    >>> max(made.to_polygons, made.from_polygons) <= 0.01
+    True
     """
     mesh = as_mesh(mesh)
     with _Watching(progress, cancel, threads, log) as watch:
-        *made, exceptions = _core.remesh_within(mesh, error, triangles, signs, over_holes, smallest_voxel,
-                                                limit_points, written_in_single, _thin(thin), except_thin,
-                                                through_volume, watch)
-    return BoundedRemesh(*made, [ExceptedBall(*ball) for ball in exceptions])
+        return _within(watch, log, mesh, error=error, triangles=triangles, signs=signs, over_holes=over_holes,
+                       smallest_voxel=smallest_voxel, limit_points=limit_points,
+                       written_in_single=written_in_single, thin=thin, except_thin=except_thin,
+                       through_volume=through_volume)
+
+
+def _within(watch: _core.Watch, log: Log | None, mesh: Mesh, *, error: float | None, triangles: int | None,
+            signs: str, written_in_single: bool, thin: str, over_holes: bool = False,
+            smallest_voxel: float = 0.0, limit_points: float | None = None, except_thin: bool = False,
+            through_volume: bool = False) -> BoundedRemesh:
+    *made, exceptions = _core.remesh_within(mesh, error, triangles, signs, over_holes, smallest_voxel,
+                                            limit_points or 0.0, written_in_single, _thin(thin), except_thin,
+                                            through_volume, watch)
+    bounded = BoundedRemesh(*made, [ExceptedBall(*ball) for ball in exceptions])
+    if log is not None:
+        log.figures.update(error_asked=bounded.error, certified_to_polygons=bounded.to_polygons,
+                           certified_from_polygons=bounded.from_polygons)
+    return bounded
 
 
 def combine(operation: str, a: MeshLike, b: MeshLike, *, resolution: int | None = None,
@@ -471,14 +986,48 @@ def combine(operation: str, a: MeshLike, b: MeshLike, *, resolution: int | None 
             extractor: str = "manifold-dual-contouring", written_in_single: bool = False,
             progress: Progress | None = None, cancel: _IsSet | None = None, threads: int | None = None,
             log: Log | None = None, **options: OptionValue) -> Mesh:
-    """Returns the "union", "intersection" or "difference" (a without b) of two meshes' solids, both on one
-    lattice with their exact crossings, which preserve the curves where their surfaces intersect.
+    """Returns the union, intersection or difference of the solids of two meshes.
 
-    resolution: voxels along the longest side of the larger solid; or voxel_size, world units. The others as
-        in remesh().
+    Both are sampled on one lattice with their exact edge crossings, which preserve the curves where their
+    surfaces
+    intersect.
 
-    Raises Error for a result that is empty or everywhere thinner than a voxel. Adds a note if parts are lost
-    between samples.
+    Parameters
+    ----------
+    operation : str
+        "union", "intersection" or "difference" (`a` without `b`).
+    a, b : MeshLike
+        The solids.
+    resolution : int, optional
+        Voxels along the longest side of the larger solid. Exactly one of this and `voxel_size` is required.
+    voxel_size : float, optional
+        Edge of a voxel, world units.
+    exterior_band, interior_band, voxelizer, signs, voxelizer_options, thin : optional
+        As in `remesh`.
+    extractor : str, default "manifold-dual-contouring"
+        One of `extractors()`.
+    written_in_single : bool, default False
+        As in `extract`.
+    progress, cancel, threads, log : optional
+        See the module `hermesh`.
+    **options
+        Options of the extractor.
+
+    Returns
+    -------
+    Mesh
+        With a note if parts are lost between samples.
+
+    Raises
+    ------
+    Error
+        If the result is empty or thinner than a voxel everywhere.
+
+    Examples
+    --------
+    >>> corner = points + 0.5, quads
+    >>> hermesh.combine("intersection", cube, corner, resolution=20)
+    <hermesh.Mesh of 8 points, 12 triangles, 0 quads>
     """
     voxelizing = _voxelizing(resolution=resolution, voxel_size=voxel_size, exterior_band=exterior_band,
                              interior_band=interior_band, voxelizer=voxelizer, signs=signs,
@@ -499,28 +1048,63 @@ def fracture(solid: MeshLike | Volume, cutters: str | MeshLike | Sequence[MeshLi
              voxelizer_options: Mapping[str, OptionValue] | None = None, thin: str | None = None,
              progress: Progress | None = None, cancel: _IsSet | None = None,
              threads: int | None = None, log: Log | None = None) -> Fracture:
-    """Breaks a solid, a mesh or a level set, into pieces that are closed and meet in shared triangles.
+    """Breaks a solid into pieces that are closed and meet in shared triangles.
 
-    cutters: "voronoi:N", "chunks:N" (Voronoi cells with rough walls), "planes:N", "planes:NX,NY,NZ,D;..."
-        (N.x = D, world units), "mesh:FILE,..." or "mesh:FILE*N"; or a list of meshes, which cut one after
-        another.
-    copies: number of copies of each mesh of the list, scattered and rotated at random; 0: each once, in
-        place.
-    seed: random seed.
-    roughness: displacement of the walls of chunks relative to the distance of seeds, 0 to 1.
-    impact: scatter densest about this point; impact_radius: distance at which the density has halved; world
-        units.
-    density: scatter in proportion to the values of this volume.
-    mesh_scale: scale factor of scattered meshes.
-    method: "labelled", or "thesis" as printed, with its rule "printed" or "repaired".
-    tolerance: maximum distance from the finest meshes, voxels; 0: nothing is merged.
-    min_volume: voxels: smaller pieces join a neighbour; 0 keeps all. split: True to split disconnected
-        pieces.
-    hermite: data of the solid: "auto", "exact" from polygons, or "level-set".
-    resolution or voxel_size, bands, voxelizer, thin: as in remesh(); not for a level set, which has voxels.
+    Parameters
+    ----------
+    solid : MeshLike or Volume
+        A mesh, or a level set.
+    cutters : str, MeshLike or list of MeshLike
+        "voronoi:N", "chunks:N" (Voronoi cells with rough walls), "planes:N", "planes:NX,NY,NZ,D;..." (N.x =
+        D, world units), "mesh:FILE,..." or "mesh:FILE*N"; or meshes, which cut one after another.
+    resolution, voxel_size : optional
+        As in `remesh`; not for a level set, which has voxels.
+    copies : int, default 0
+        Copies of each mesh of the list, scattered and rotated at random; 0: each once, in place.
+    seed : int, default 0
+        Random seed.
+    roughness : float, default 0.12
+        Displacement of the walls of chunks relative to the distance of seeds, 0 to 1.
+    impact : sequence of three float, optional
+        Scatter densest about this point, world units.
+    impact_radius : float, optional
+        Distance from `impact` at which the density has halved, world units.
+    density : Volume, optional
+        Scatter in proportion to the values of this volume.
+    mesh_scale : float, default 1.0
+        Scale factor of scattered meshes.
+    method : str, default "labelled"
+        Or "thesis", as printed, with its `rule`.
+    tolerance : float, default 0.0
+        Maximum distance from the finest meshes, voxels; 0: nothing is merged.
+    rule : str, default "printed"
+        Of the method thesis; or "repaired".
+    min_volume : float, default 27.0
+        Voxels; smaller pieces join a neighbour. 0 preserves all.
+    split : bool, default True
+        True to split disconnected pieces.
+    hermite : str, default "auto"
+        Data of the solid: "auto", "exact" from polygons, or "level-set".
+    exterior_band, interior_band, voxelizer, signs, voxelizer_options, thin : optional
+        As in `remesh`.
+    progress, cancel, threads, log : optional
+        See the module `hermesh`.
 
-    Raises Error for unknown options, or a solid without an inside. Adds a note for each cutter without
-    effect.
+    Returns
+    -------
+    Fracture
+        The pieces, with a note for each cutter without effect.
+
+    Raises
+    ------
+    Error
+        If an option is unknown, or the solid has no inside.
+
+    Examples
+    --------
+    >>> broken = hermesh.fracture(cube, "planes:1,0,0,0.25", resolution=20)
+    >>> [round(piece.volume, 3) for piece in broken.pieces]
+    [0.25, 0.75]
     """
     options = _filled(_core.FractureOptions(), seed=seed, roughness=roughness,
                       impact=None if impact is None else [float(x) for x in impact],
@@ -562,17 +1146,51 @@ def validate(mesh: MeshLike, *, reference: MeshLike | None = None, certify: bool
              log: Log | None = None) -> "_validation.Report":
     """Validates a mesh: topology, self-intersections, distances.
 
-    reference: mesh for the distances and the comparison of the solids.
-    certify: True to certify bounds of the Hausdorff distances to the reference.
-    features: mesh whose sharp edges, of at least `dihedral` degrees, and corners the mesh should reproduce.
-    samples: on each surface for the distances.
-    voxel_size: world units, of the volume that the mesh was made from: differences within sqrt(3) voxels are
-        explained.
-    self_intersections: True to search for them. libraries: True to let OpenMesh and CGAL count, too.
+    Validation links CGAL, so programs that call it are under GPL-3.
 
-    Returns a report: str() of it is the verdict, `watertight` and the counts are attributes, to_dict() has
-    all values. Validation links CGAL, so programs that call it are under GPL-3. Raises Error for options
-    without effect.
+    Parameters
+    ----------
+    mesh : MeshLike
+        The mesh to validate.
+    reference : MeshLike, optional
+        Mesh for the distances and the comparison of the solids.
+    certify : bool, default False
+        True to certify bounds of the Hausdorff distances to the reference.
+    features : MeshLike, optional
+        Mesh whose sharp edges and corners the mesh should reproduce.
+    dihedral : float, default 30.0
+        Least angle of a sharp edge of `features`, degrees.
+    samples : int, default 200000
+        Samples on each surface for the distances.
+    voxel_size : float, default 0.0
+        Of the volume that the mesh was made from, world units: differences within sqrt(3) voxels are
+        explained. 0: unknown.
+    self_intersections : bool, default True
+        True to search for self-intersections.
+    libraries : bool, default True
+        True to let OpenMesh and CGAL repeat the counts.
+    progress, cancel, threads, log : optional
+        See the module `hermesh`.
+
+    Returns
+    -------
+    Report
+        str() of it is the verdict, `watertight` and the counts are attributes, and `to_dict()` has all
+        values.
+
+    Raises
+    ------
+    Error
+        If an option has no effect, or validation is not installed.
+
+    Examples
+    --------
+    >>> report = hermesh.validate(cube)
+    >>> report.watertight, report.volume
+    (True, 1.0)
+    >>> report = hermesh.validate((points, quads[1:]))
+    >>> report.watertight, report.boundary_edges
+    (False, 4)
     """
     validators = _validators()
     validated = as_mesh(mesh)
@@ -587,7 +1205,26 @@ def validate(mesh: MeshLike, *, reference: MeshLike | None = None, certify: bool
 def validate_fracture(pieces: Fracture | Iterable[MeshLike], *, progress: Progress | None = None,
                       cancel: _IsSet | None = None, threads: int | None = None,
                       log: Log | None = None) -> "_validation.FractureReport":
-    """Validates all pieces of a fracture together: each piece, and that all fit without gap or overlap."""
+    """Validates all pieces of a fracture together.
+
+    Parameters
+    ----------
+    pieces : Fracture or iterable of MeshLike
+        The pieces.
+    progress, cancel, threads, log : optional
+        See the module `hermesh`.
+
+    Returns
+    -------
+    FractureReport
+        `consistent` is True if each piece is valid, and all fit without gap or overlap.
+
+    Examples
+    --------
+    >>> broken = hermesh.fracture(cube, "planes:1,0,0,0.25", resolution=20)
+    >>> hermesh.validate_fracture(broken).consistent
+    True
+    """
     validators = _validators()
     if isinstance(pieces, Fracture):
         meshes = [piece.mesh for piece in pieces.pieces]

@@ -57,6 +57,9 @@ class SameBytes(unittest.TestCase):
         made = hermesh.remesh_within(self.torus, error=0.03)
         self.compare(made.mesh, ".ply", "remesh", self.torus, "--error", 0.03)
         self.assertLessEqual(max(made.to_polygons, made.from_polygons), 0.03)
+        self.compare(hermesh.remesh_within(self.torus, triangles=300).mesh, ".ply", "remesh", self.torus,
+                     "--triangles", 300)
+        self.compare(hermesh.remesh(self.torus, error=0.03), ".ply", "remesh", self.torus, "--error", 0.03)
         with self.assertRaises(hermesh.Error):
             hermesh.remesh_within(self.torus)
 

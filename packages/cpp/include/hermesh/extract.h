@@ -75,9 +75,9 @@ struct BoundOptions {
   std::string signs = "winding-number";  ///< how the inside is found; or "flood-fill" or "auto"
   bool over_holes = false;               ///< true if holes may be closed where no polygon is near
   double smallest_voxel = 0.0;           ///< world units; 0: an eighth of the error
-  double most_points = 3e7;              ///< maximum number of vertices of the finest mesh
-  bool written_in_single = false;        ///< as in ExtractOptions
-  Thin thin = Thin::keep;  ///< otherwise a part that the smallest voxels do not show is an error
+  double most_points = 0.0;  ///< maximum number of vertices of the finest mesh; 0: 3e7 for an error, else 4e5
+  bool written_in_single = false;  ///< as in ExtractOptions
+  Thin thin = Thin::keep;          ///< otherwise a part that the smallest voxels do not show is an error
   /// True if a volume is made even if the polygons are a closed, manifold mesh free of self-intersection,
   /// which is otherwise simplified itself.
   bool through_volume = false;
