@@ -205,7 +205,7 @@ LabelledFracture labelled_fracture(const FloatHermite& object, const Cutters& cu
     result.cut_edges = 0;
     for (std::size_t e = 0; e < grid.edge_count(); ++e) result.cut_edges += grid.sides(e).front > 0;
     result.cutters = records_of(solid, grid, cutters, result.merged);
-    result.mesh = joint_mesh(grid, options.placement, context);
+    result.mesh = joint_mesh(grid, options.placement, context, options.from_voxels);
   } while (!result.mesh.meeting_joints.empty());
   count_gaps(solid, result, context);
   // Decimation is the last step, because its patches depend on the final labels. The counts above refer to

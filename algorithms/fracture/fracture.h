@@ -9,6 +9,7 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -45,6 +46,9 @@ const char* in_words(CutterRecord::State state);
 
 struct FractureOptions {
   DualContouringOptions placement;
+  /// Largest distance of vertices from the boundary between voxels, as in joint_mesh(); none: vertices may
+  /// leave their cells for sharp features.
+  std::optional<double> from_voxels = std::nullopt;
   double tolerance = 0.0;            ///< voxels; above 0 the mesh is made coarser (joint_decimation.h)
   bool split = true;                 ///< split disconnected pieces
   std::uint64_t least_samples = 27;  ///< merges smaller pieces into a neighbour; 27: a cube of 3³, 0: none

@@ -12,7 +12,8 @@ LabelledGrid::LabelledGrid(LabelledSolid& solid, const FloatHermite& hermite, co
     : solid_(solid),
       cuts_(solid.blocks.size()),
       joint_sheets_(solid.blocks.size()),
-      first_(solid.blocks.size()) {
+      first_(solid.blocks.size()),
+      made_up_edges_(solid.blocks.size()) {
   const Stage stage(context, "crossings of the cuts");
   // Count, scan, fill (parallel.h): each block writes its own range of crossings and sides, so no two threads
   // write the same element, and the order is that of block, axis and sample at any number of threads.
@@ -101,6 +102,7 @@ std::uint64_t LabelledGrid::fill_block(std::size_t b, const FloatHermite& hermit
       // No surface passes between these samples. The edge needs a crossing all the same, for polygons close
       // the two pieces here: the end nearer to the surface misplaces it least.
       ++made_up;
+      set_bit(made_up_edges_.at(b)[axis], sample);
       if (codes[1][0] != codes[1][1])
         if (const auto found =
                 cutters.nearest(solid_.index(block, sample), axis, value(codes[1][0]), value(codes[1][1]))) {

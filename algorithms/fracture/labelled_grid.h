@@ -43,6 +43,8 @@ class LabelledGrid : public CellGrid {
   const EdgeSides& sides(std::size_t edge) const { return sides_[edge]; }
   std::size_t edge_count() const { return sides_.size(); }
   std::uint64_t made_up() const { return made_up_; }  ///< how many crossings are made up
+  /// Returns the edges with a made-up crossing, by block and axis.
+  const ByBlock<std::array<BlockMask, 3>>& made_up_edges() const { return made_up_edges_; }
   std::size_t memory_bytes() const;
 
  private:
@@ -57,6 +59,7 @@ class LabelledGrid : public CellGrid {
   LargeArray<EdgeCrossing> crossings_;
   LargeArray<EdgeSides> sides_;
   std::uint64_t made_up_ = 0;
+  ByBlock<std::array<BlockMask, 3>> made_up_edges_;
 };
 
 /// Fills in the `joined_faces` of a solid that is as whole_solid() makes it, still of one piece.

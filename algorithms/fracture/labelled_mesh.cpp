@@ -3,15 +3,20 @@
 #include <algorithm>
 
 #include "algorithms/core/parallel.h"
+#include "algorithms/extraction/embedded_mesh/near_voxels.h"
 
 namespace hermesh {
 
-JointMesh joint_mesh(const LabelledGrid& grid, const DualContouringOptions& options, RunContext& context) {
+JointMesh joint_mesh(const LabelledGrid& grid, const DualContouringOptions& options, RunContext& context,
+                     std::optional<double> from_voxels) {
   const FilePoints file(grid.placement());
   PolygonEdges edges;
   // uniform_mesh() does not depend on the pieces on the two sides of an edge, so one call makes the polygons
   // of all pieces, each seam once; `edges` maps each polygon to its edge, which stores its sides.
-  UniformMesh uniform = uniform_mesh(grid, options, file, context, &edges);
+  UniformMesh uniform = from_voxels
+                            ? uniform_mesh_near_voxels(grid, options, {*from_voxels, &grid.made_up_edges()},
+                                                       file, context, &edges)
+                            : uniform_mesh(grid, options, file, context, &edges);
   const Stage stage(context, "sides of the triangles");
   JointMesh mesh;
   mesh.placement = grid.placement();

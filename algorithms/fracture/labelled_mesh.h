@@ -3,6 +3,7 @@
 
 #include <Eigen/Core>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -37,8 +38,11 @@ struct JointMesh {
 
 /// Makes the mesh of all pieces. The position of a joint's vertex depends on all crossings of the joint, so
 /// that the boundary of a cut is a sharp crease even where the original surface is smooth. The result has the
-/// same bytes at any thread count. @throws Cancelled.
-JointMesh joint_mesh(const LabelledGrid& grid, const DualContouringOptions& options, RunContext& context);
+/// same bytes at any thread count. `from_voxels`, if given, confines the vertices to their cells and bounds
+/// their distance from the boundary between voxels (extraction/embedded_mesh/near_voxels.h).
+/// @throws Cancelled.
+JointMesh joint_mesh(const LabelledGrid& grid, const DualContouringOptions& options, RunContext& context,
+                     std::optional<double> from_voxels = std::nullopt);
 
 /// Which triangles of a joint mesh bound each piece.
 class PieceTriangles {

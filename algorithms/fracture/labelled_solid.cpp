@@ -32,19 +32,6 @@ std::vector<Lower> blocks_with_samples(const FloatHermite& hermite) {
   return result;
 }
 
-/// The given blocks and, for each, the seven that lie one step down along some axes; ascending, each once.
-std::vector<Lower> with_those_below(const std::vector<Lower>& blocks) {
-  std::vector<Lower> all;
-  all.reserve(8 * blocks.size());
-  for (const Lower& b : blocks)
-    for (int down = 0; down < 8; ++down)
-      all.push_back({b[0] - 8 * (down & 1), b[1] - 8 * ((down >> 1) & 1), b[2] - 8 * (down >> 2)});
-  // Equal entries are indistinguishable, so an unstable sort gives the same list at any thread count.
-  tbb::parallel_sort(all.begin(), all.end());
-  all.erase(std::unique(all.begin(), all.end()), all.end());
-  return all;
-}
-
 /// The codes of one block as numbers in a list of those that occur in it.
 struct BlockCodes {
   std::vector<CutCode> values;
@@ -69,6 +56,18 @@ BlockCodes codes_of_block(const ViewBlock& block, const Cutters& cutters) {
 }
 
 }  // namespace
+
+std::vector<Lower> with_those_below(const std::vector<Lower>& blocks) {
+  std::vector<Lower> all;
+  all.reserve(8 * blocks.size());
+  for (const Lower& b : blocks)
+    for (int down = 0; down < 8; ++down)
+      all.push_back({b[0] - 8 * (down & 1), b[1] - 8 * ((down >> 1) & 1), b[2] - 8 * (down >> 2)});
+  // Equal entries are indistinguishable, so an unstable sort gives the same list at any thread count.
+  tbb::parallel_sort(all.begin(), all.end());
+  all.erase(std::unique(all.begin(), all.end()), all.end());
+  return all;
+}
 
 void LabelField::assign(std::int32_t block, const Values& values) {
   const auto b = static_cast<std::size_t>(block);

@@ -90,6 +90,11 @@ struct LabelledSolid {
   }
 };
 
+/// Returns the given blocks, by their first samples, and the seven below each, in which cells with a corner
+/// in it begin; ascending, each once.
+std::vector<std::array<std::int32_t, 3>> with_those_below(
+    const std::vector<std::array<std::int32_t, 3>>& blocks);
+
 /// Labels, or codes, of a block's samples and of the layers one step beyond along each axis: sample (x, y,
 /// z), each from 0 to 8, is at 81x + 9y + z.
 using LabelCube = std::array<std::uint32_t, 729>;

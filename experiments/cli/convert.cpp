@@ -19,6 +19,7 @@
 #include "algorithms/remesh/tiled_remesh.h"
 #include "experiments/cli/cli11.h"
 #include "experiments/cli/conversions.h"
+#include "experiments/cli/labels.h"
 #include "experiments/cli/signals.h"
 #include "validation/visible_loss.h"
 
@@ -183,6 +184,7 @@ int run_extract(ConvertArguments& arguments, Session& session) {
     source = read_polygons(arguments.source, session);
   }
   const LevelSet level_set = read_level_set(arguments.paths.in, arguments.grid, session.context);
+  note_label_map(level_set, session);
   const std::optional<AdaptivityField> field = read_adaptivity(arguments, session);
   Stopwatch watch;
   PolygonMesh mesh = about_file(arguments.paths.in, [&] {
@@ -681,7 +683,12 @@ void add_conversions(CLI::App& app, Session& session) {
   command->add_option(
       "--attributes", arguments->attributes,
       "Grids of the volume, separated by commas, or all, to sample at the vertices, for .ply");
-  set_work(*command, session, [arguments, &session] { return run_extract(*arguments, session); });
+  const auto labels = add_label_options(*command);
+  set_work(*command, session, [arguments, labels, command, &session] {
+    return asks_for_labels(*labels)
+               ? run_extract_labels(*labels, arguments->paths, arguments->grid, *command, session)
+               : run_extract(*arguments, session);
+  });
 
   arguments = std::make_shared<ConvertArguments>();
   command = add_command(app, session, "remesh", "Convert polygons to a level set and back to a mesh");

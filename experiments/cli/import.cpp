@@ -18,6 +18,7 @@ struct ImportArguments {
   std::uint64_t offset = 0;
   std::optional<std::int64_t> frame;
   std::optional<double> replacement;
+  bool labels = false;
 };
 
 /// Reads three numbers with commas between them. @throws UsageError
@@ -63,6 +64,31 @@ void check_nifti(const ImportArguments& arguments) {
         "--type and --spacing");
 }
 
+int import_labels(const ImportArguments& arguments, const std::optional<RawLayout>& layout,
+                  const ImportOptions& options, Session& session) {
+  Stopwatch watch;
+  const ImportedLabels labels = layout
+                                    ? import_raw_labels(arguments.paths.in, *layout, options, session.context)
+                                    : import_nifti_labels(arguments.paths.in, options, session.context);
+  write_imported(arguments.paths.out, labels, session.context);
+  work_is_finished();
+  Json list = Json::array();
+  for (const auto& [label, samples] : labels.samples)
+    list.push_back({{"label", label}, {"samples", samples}});
+  made(session, "samples", labels.dims);
+  made(session, "lowest", 0);
+  made(session, "highest", labels.samples.rbegin()->first);
+  made(session, "voxel_size", labels.voxel_size);
+  made(session, "grids", std::vector<std::string>{"labels"});
+  made(session, "labels", list);
+  print_summary(session, "imported " + arguments.paths.in + ": " + std::to_string(labels.dims[0]) + " x " +
+                             std::to_string(labels.dims[1]) + " x " + std::to_string(labels.dims[2]) +
+                             " samples, " + std::to_string(list.size()) + " labels up to " +
+                             std::to_string(labels.samples.rbegin()->first) + ", " +
+                             seconds_text(watch.seconds()));
+  return kDone;
+}
+
 int run_import(const ImportArguments& arguments, Session& session) {
   ImportOptions options{.replacement = {}, .frame = arguments.frame};
   if (arguments.replacement) {
@@ -76,6 +102,7 @@ int run_import(const ImportArguments& arguments, Session& session) {
   else
     check_nifti(arguments);
   check_volume_output(arguments.paths.out);
+  if (arguments.labels) return import_labels(arguments, layout, options, session);
   Stopwatch watch;
   const LevelSet volume = layout ? import_raw(arguments.paths.in, *layout, options, session.context)
                                  : import_nifti(arguments.paths.in, options, session.context);
@@ -103,9 +130,13 @@ void add_import(CLI::App& app, Session& session) {
   add_paths(
       *command, session, arguments->paths,
       "Volume: .nii .hdr .img, or with --dims raw samples; all also gzipped; or - for the standard input",
-      FileKind::imported, "Volume: .vdb, the grid `volume` in millimetres, or - for the standard output",
+      FileKind::imported,
+      "Volume: .vdb, the grid `volume` (with --labels `labels`) in millimetres, or - for the standard output",
       FileKind::volume);
   add_json_option(*command, session);
+  command->add_flag("--labels", arguments->labels,
+                    "Import a label map: samples are whole numbers from 0, the background, to 2147483647, "
+                    "and stay integers (then: hermesh extract --labels all)");
   command->add_option("--frame", arguments->frame,
                       "Index of the volume in a NIfTI file, from 0 (default: the first)");
   command->add_option("--dims", arguments->dims,

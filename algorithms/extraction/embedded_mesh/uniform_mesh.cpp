@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <limits>
 #include <optional>
 #include <span>
 
@@ -12,6 +13,7 @@
 #include "algorithms/extraction/dual_contouring/qef.h"
 #include "algorithms/extraction/embedded_mesh/cell_records.h"
 #include "algorithms/extraction/embedded_mesh/late_moves.h"
+#include "algorithms/extraction/embedded_mesh/near_voxels.h"
 #include "algorithms/extraction/embedded_mesh/tested_polygons.h"
 
 namespace hermesh {
@@ -32,6 +34,9 @@ constexpr double kLongestSpur = 1.0;
 /// Least cosine of the angle between the directions of one crease in two cells.
 constexpr double kSameLine = 0.9999;
 
+/// Part of the distance from the boundary between voxels that is left for rounding, voxels.
+constexpr double kRounding = 1e-4;
+
 /// Least determinant, with terms of the order of one, that is certainly positive: far above rounding.
 constexpr double kLeastVolume = 1e-5;
 
@@ -44,12 +49,14 @@ double volume(const Vector3d& a, const Vector3d& b, const Vector3d& c, const Vec
 class UniformContourer {
  public:
   UniformContourer(const CellGrid& grid, const DualContouringOptions& options, const FilePoints& file,
-                   RunContext& context, PolygonEdges* numbers, const UniformTiling& tiling = {})
+                   RunContext& context, PolygonEdges* numbers, const UniformTiling& tiling = {},
+                   const NearVoxels& near = {std::numeric_limits<double>::infinity()})
       : numbers_(numbers),
         tiling_(tiling),
         cells_(grid, context),
         options_(options),
         reach_(std::min(options.reach, kFarthestFromCell)),
+        near_(near),
         file_(file),
         targets_(cells_.size()),
         corners_of_planes_(cells_.size()),
@@ -193,8 +200,8 @@ class UniformContourer {
     for (std::size_t i = 0; i < found; ++i) {
       if (!is_placed[i]) continue;
       set_bit(placed, cell[i]);
-      points_[point[i]] =
-          file_.rounded(cells_.corner(block, cell[i]) + Vector3d(place[0][i], place[1][i], place[2][i]));
+      points_[point[i]] = file_.rounded(near_voxels(
+          block, cell[i], cells_.corner(block, cell[i]) + Vector3d(place[0][i], place[1][i], place[2][i])));
     }
     return placed;
   }
@@ -207,8 +214,33 @@ class UniformContourer {
     const Qef qef = planes_of(block, cell, sheet, sheets, sum);
     if (sheets > 1) return sum / qef.planes();
     if (options_.placement == DualContouringOptions::Placement::average)
-      return cells_.is_plain(block, cell) ? qef.mass_point() : Vector3d(sum / qef.planes());
-    return best_place(block, cell, qef, cells_.corner(block, cell));
+      return near_voxels(block, cell,
+                         cells_.is_plain(block, cell) ? qef.mass_point() : Vector3d(sum / qef.planes()));
+    return near_voxels(block, cell, best_place(block, cell, qef, cells_.corner(block, cell)));
+  }
+
+  /// Returns the position, moved towards the middle of its cell if it is farther from the boundary between
+  /// voxels than allowed. Within a cell this boundary consists of a quarter of a voxel's face for
+  /// each crossed edge. These quarters have the middle of the cell in common, so distances from them shrink
+  /// in proportion to that from the middle.
+  Vector3d near_voxels(std::int32_t block, int cell, const Vector3d& place) const {
+    const double most = near_.distance - kRounding;
+    const Vector3d middle = cells_.corner(block, cell) + Vector3d::Constant(0.5), from = place - middle;
+    if (from.norm() <= most) return place;
+    double squared = std::numeric_limits<double>::infinity();
+    for (int edge = 0; edge < 12; ++edge) {
+      const int axis = edge_axis(edge);
+      const CellBlocks::Edge at = cells_.edge_of_cell(block, cell, edge);
+      if (!cells_.is_crossed(at)) continue;
+      if (near_.not_on_boundary && test((*near_.not_on_boundary)[at.block][axis], at.sample)) continue;
+      const std::array<int, 3> side = edge_offset(edge);
+      double sum = from[axis] * from[axis];
+      for (const int across : {(axis + 1) % 3, (axis + 2) % 3})
+        if ((from[across] > 0) != (side[across] > 0)) sum += from[across] * from[across];
+      squared = std::min(squared, sum);
+    }
+    if (squared <= most * most || std::isinf(squared)) return place;
+    return middle + most / std::sqrt(squared) * from;
   }
 
   /// Returns the planes at the crossings of a sheet, and adds the positions of these, held within margin().
@@ -495,6 +527,7 @@ class UniformContourer {
   CellBlocks cells_;
   const DualContouringOptions options_;
   const double reach_;  ///< largest distance of vertices from their cells, voxels
+  const NearVoxels near_;
   const FilePoints& file_;
   const leaf_kernels::Kernels& kernels_ = chosen_kernels<leaf_kernels::Kernels>();
   std::vector<std::vector<PointTarget>> targets_;    ///< one list per block, ascending by cell
@@ -584,6 +617,13 @@ EdgePolygons UniformCells::connect(const EdgeMasks* edges, RunContext& context) 
 UniformMesh uniform_mesh(const CellGrid& grid, const DualContouringOptions& options, const FilePoints& file,
                          RunContext& context, PolygonEdges* edges) {
   return UniformContourer(grid, options, file, context, edges).run(context);
+}
+
+UniformMesh uniform_mesh_near_voxels(const CellGrid& grid, DualContouringOptions options,
+                                     const NearVoxels& near, const FilePoints& file, RunContext& context,
+                                     PolygonEdges* edges) {
+  options.reach = 0.0;
+  return UniformContourer(grid, options, file, context, edges, {}, near).run(context);
 }
 
 }  // namespace hermesh

@@ -150,9 +150,11 @@ void decode(std::span<const unsigned char> bytes, const StoredSamples& stored, s
 
 using Leaf = openvdb::FloatTree::LeafNodeType;
 
-/// Reads the samples as floats, in the order of the file, x fastest.
-std::vector<float> read_values(ByteSource& source, const StoredSamples& stored, const ImportOptions& options,
-                               RunContext& context) {
+/// Reads the samples in the order of the file, x fastest. `decode` writes a part of them, given by the bytes,
+/// the number of the first sample, and the values.
+template <class Value, class Decode>
+std::vector<Value> read_samples(ByteSource& source, const StoredSamples& stored, RunContext& context,
+                                Decode&& decode) {
   source.skip(stored.offset - source.position(), context);
   const std::size_t size = size_of(stored.format.type);
   const std::size_t count = static_cast<std::size_t>(stored.dims[0] * stored.dims[1] * stored.dims[2]);
@@ -160,16 +162,27 @@ std::vector<float> read_values(ByteSource& source, const StoredSamples& stored, 
   constexpr std::size_t kPart = std::size_t{1} << 20;
   std::vector<unsigned char> bytes(std::min(count, kPart) * size);
   // Grows with the samples read, so that a gzipped file that claims too much ends before memory does.
-  std::vector<float> values;
-  DecodeCounts counts;
+  std::vector<Value> values;
   while (values.size() < count) {
     const std::size_t first = values.size(), part = std::min(kPart, count - first);
     const auto packed = std::span(bytes).first(part * size);
     source.read(packed, context);
     values.resize(first + part);
-    decode(packed, stored, std::span(values).subspan(first), counts);
+    decode(packed, first, std::span(values).subspan(first));
     context.progress("read volume", static_cast<double>(values.size()) / static_cast<double>(count));
   }
+  return values;
+}
+
+/// Reads the samples as floats, in the order of the file, x fastest.
+std::vector<float> read_values(ByteSource& source, const StoredSamples& stored, const ImportOptions& options,
+                               RunContext& context) {
+  DecodeCounts counts;
+  std::vector<float> values =
+      read_samples<float>(source, stored, context,
+                          [&](std::span<const unsigned char> packed, std::size_t, std::span<float> part) {
+                            decode(packed, stored, part, counts);
+                          });
   if (counts.not_finite > 0 && !options.replacement)
     throw Error(joined(stored.file, " holds ", counts.not_finite,
                        " samples that are NaN, infinite or too large for single precision; replace them with "
@@ -185,11 +198,82 @@ std::vector<float> read_values(ByteSource& source, const StoredSamples& stored, 
   return values;
 }
 
+/// Reads the samples as labels, in the order of the file. @throws Error for a sample that is no label
+std::vector<std::int32_t> read_labels(ByteSource& source, const StoredSamples& stored,
+                                      const ImportOptions& options, RunContext& context) {
+  const bool swapped = is_swapped(stored.format.big_endian);
+  const auto refuse = [&](double value, std::size_t number) {
+    const auto n = static_cast<std::int64_t>(number);
+    const std::int64_t x = n % stored.dims[0], y = n / stored.dims[0] % stored.dims[1],
+                       z = n / (stored.dims[0] * stored.dims[1]);
+    throw Error(joined(stored.file, " holds the value ", value, " at sample (", x, ", ", y, ", ", z,
+                       "), which is not a label (a whole number from 0 to 2147483647); import it without "
+                       "--labels, or round its samples first"));
+  };
+  return read_samples<std::int32_t>(
+      source, stored, context,
+      [&](std::span<const unsigned char> packed, std::size_t first, std::span<std::int32_t> part) {
+        with_type(stored.format.type, [&](auto zero) {
+          for (std::size_t i = 0; i < part.size(); ++i) {
+            const auto number =
+                static_cast<double>(stored_number<decltype(zero)>(packed.data() + i * sizeof zero, swapped));
+            double value = stored.slope * number + stored.intercept;
+            if (!std::isfinite(value) && options.replacement) value = double(*options.replacement);
+            if (!(value >= 0.0 && value <= 2147483647.0 && value == std::floor(value)))
+              refuse(value, first + i);
+            part[i] = static_cast<std::int32_t>(value);
+          }
+        });
+      });
+}
+
+/// Notes if integer samples look like labels: few values, nearly all equal to the next along x.
+void note_likely_labels(const std::vector<float>& values, const StoredSamples& stored, float lowest,
+                        float highest, RunContext& context) {
+  constexpr float kMostLabel = 65535.0f;
+  constexpr std::size_t kMostValues = 256;
+  constexpr double kMostChanges = 0.05;
+  const bool is_integer =
+      stored.format.type != NumberType::float32 && stored.format.type != NumberType::float64;
+  if (!is_integer || lowest != 0.0f || highest > kMostLabel || stored.slope != std::floor(stored.slope) ||
+      stored.intercept != std::floor(stored.intercept))
+    return;
+  std::vector<bool> found(static_cast<std::size_t>(highest) + 1);
+  std::size_t changes = 0, kinds = 0;
+  float before = -1.0f;
+  for (const float value : values) {
+    if (value == before) continue;
+    ++changes;
+    before = value;
+    if (!found[static_cast<std::size_t>(value)]) ++kinds, found[static_cast<std::size_t>(value)] = true;
+  }
+  if (kinds < 3 || kinds > kMostValues || double(changes) > kMostChanges * double(values.size())) return;
+  context.note(joined(stored.file, " looks like a label map, with ", kinds - 1,
+                      " labels; pass --labels to extract the boundary of each"));
+}
+
 /// Returns the next lower number in single precision; near 0 the next normal one, since denormal numbers may
 /// be flushed to 0.
 float just_below(float value) {
   const float next = std::nextafter(value, -std::numeric_limits<float>::infinity());
   return std::fabs(next) < std::numeric_limits<float>::min() ? -std::numeric_limits<float>::min() : next;
+}
+
+using LabelLeaf = openvdb::Int32Tree::LeafNodeType;
+
+/// Makes a leaf of labels, or null if it holds none; the background is inactive.
+LabelLeaf* make_leaf(const std::vector<std::int32_t>& values, const std::array<std::int64_t, 3>& dims,
+                     const openvdb::Coord& lower) {
+  auto leaf = std::make_unique<LabelLeaf>(lower, 0, false);
+  for (int x = 0; x < 8; ++x)
+    for (int y = 0; y < 8; ++y)
+      for (int z = 0; z < 8; ++z) {
+        const std::int64_t i = lower.x() + x, j = lower.y() + y, k = lower.z() + z;
+        if (i >= dims[0] || j >= dims[1] || k >= dims[2]) continue;
+        const std::int32_t label = values[static_cast<std::size_t>(i + dims[0] * (j + dims[1] * k))];
+        if (label != 0) leaf->setValueOn(static_cast<openvdb::Index>(64 * x + 8 * y + z), label);
+      }
+  return leaf->isEmpty() ? nullptr : leaf.release();
 }
 
 /// Makes a leaf of the samples; those beyond the box are background and inactive.
@@ -208,22 +292,44 @@ Leaf* make_leaf(const std::vector<float>& values, const std::array<std::int64_t,
   return leaf;
 }
 
-openvdb::FloatGrid::Ptr make_grid(const std::vector<float>& values, const StoredSamples& stored,
-                                  float background, RunContext& context) {
+/// Makes a grid of the leaves that make_leaf(first sample) returns for the blocks of the box.
+template <class Grid, class MakeLeaf>
+typename Grid::Ptr make_grid(const StoredSamples& stored, typename Grid::ValueType background,
+                             RunContext& context, MakeLeaf&& make_leaf) {
   std::array<std::size_t, 3> blocks;
   for (int axis = 0; axis < 3; ++axis) blocks[axis] = static_cast<std::size_t>((stored.dims[axis] + 7) / 8);
   // Leaves are filled in parallel and added to the tree one by one.
-  std::vector<std::unique_ptr<Leaf>> leaves(blocks[0] * blocks[1] * blocks[2]);
+  std::vector<std::unique_ptr<typename Grid::TreeType::LeafNodeType>> leaves(blocks[0] * blocks[1] *
+                                                                             blocks[2]);
   parallel_blocks(leaves.size(), context, [&](std::size_t i) {
     const openvdb::Coord lower(static_cast<int>(8 * (i / (blocks[1] * blocks[2]))),
                                static_cast<int>(8 * (i / blocks[2] % blocks[1])),
                                static_cast<int>(8 * (i % blocks[2])));
-    leaves[i].reset(make_leaf(values, stored.dims, lower, background));
+    leaves[i].reset(make_leaf(lower));
   });
-  auto grid = openvdb::FloatGrid::create(background);
-  for (auto& leaf : leaves) grid->tree().addLeaf(leaf.release());
+  auto grid = Grid::create(background);
+  for (auto& leaf : leaves)
+    if (leaf) grid->tree().addLeaf(leaf.release());
   openvdb::tools::prune(grid->tree());  // exactly constant regions only
   return grid;
+}
+
+/// Sets the transform and the metadata of an imported grid. @throws Error for a transform that OpenVDB
+/// refuses
+void describe(openvdb::GridBase& grid, const StoredSamples& stored) {
+  openvdb::math::Mat4d matrix;  // transposed, since OpenVDB multiplies row vectors
+  for (int row = 0; row < 4; ++row)
+    for (int column = 0; column < 4; ++column) matrix(row, column) = stored.to_world(column, row);
+  try {
+    grid.setTransform(openvdb::math::Transform::createLinearTransform(matrix));
+  } catch (const openvdb::Exception&) {  // it checks the determinant, whatever the unit of length
+    throw Error(joined(stored.file,
+                       " has voxels that are too small or too flat for OpenVDB; scale its transform up"));
+  }
+  grid.setGridClass(openvdb::GRID_UNKNOWN);
+  grid.insertMeta("hermesh_source",
+                  openvdb::StringMetadata(std::filesystem::path(stored.file).filename().string()));
+  grid.insertMeta("hermesh_sample_type", openvdb::StringMetadata(name_of(stored.format)));
 }
 
 /// Returns the bytes of the samples. @throws Error for dimensions below 1 or beyond index coordinates, for
@@ -264,21 +370,12 @@ LevelSet read_stored(ByteSource& source, const StoredSamples& stored, const Impo
   const float background = *lowest > 0.0f ? 0.0f : just_below(*lowest);
   if (!std::isfinite(background))
     throw Error(joined(stored.file, " holds the lowest number of single precision; rescale its samples"));
-  const openvdb::FloatGrid::Ptr grid = make_grid(values, stored, background, context);
-  openvdb::math::Mat4d matrix;  // transposed, since OpenVDB multiplies row vectors
-  for (int row = 0; row < 4; ++row)
-    for (int column = 0; column < 4; ++column) matrix(row, column) = stored.to_world(column, row);
-  try {
-    grid->setTransform(openvdb::math::Transform::createLinearTransform(matrix));
-  } catch (const openvdb::Exception&) {  // it checks the determinant, whatever the unit of length
-    throw Error(joined(stored.file,
-                       " has voxels that are too small or too flat for OpenVDB; scale its transform up"));
-  }
+  note_likely_labels(values, stored, *lowest, *highest, context);
+  const auto grid = make_grid<openvdb::FloatGrid>(
+      stored, background, context,
+      [&](const openvdb::Coord& lower) { return make_leaf(values, stored.dims, lower, background); });
+  describe(*grid, stored);
   grid->setName("volume");
-  grid->setGridClass(openvdb::GRID_UNKNOWN);
-  grid->insertMeta("hermesh_source",
-                   openvdb::StringMetadata(std::filesystem::path(stored.file).filename().string()));
-  grid->insertMeta("hermesh_sample_type", openvdb::StringMetadata(name_of(stored.format)));
   grid->insertMeta("hermesh_minimum", openvdb::FloatMetadata(*lowest));
   grid->insertMeta("hermesh_maximum", openvdb::FloatMetadata(*highest));
   return make_level_set(grid);
@@ -496,14 +593,9 @@ std::uint64_t samples_offset(const NiftiHeader& header) {
   return static_cast<std::uint64_t>(offset);
 }
 
-}  // namespace
-
-bool is_nifti_path(const fs::path& path) {
-  const std::string extension = unpacked_name(path).second;
-  return extension == ".nii" || extension == ".hdr" || extension == ".img";
-}
-
-LevelSet import_nifti(const fs::path& path, const ImportOptions& options, RunContext& context) {
+/// Opens a NIfTI file and returns work(source, stored), for which the source is at or before the samples.
+template <class Work>
+auto with_nifti(const fs::path& path, const ImportOptions& options, RunContext& context, Work&& work) {
   const fs::path header_path = unpacked_name(path).second == ".img" ? companion(path, ".hdr") : path;
   ByteSource first(header_path);
   const NiftiHeader header(first, header_path.string(), context);
@@ -529,11 +621,12 @@ LevelSet import_nifti(const fs::path& path, const ImportOptions& options, RunCon
   const std::uint64_t frame_bytes = check_stored(stored, source.at_most());
   choose_frame(header, frames, frame_bytes, options, stored, context);
   check_stored(stored, source.at_most());
-  return read_stored(source, stored, options, context);
+  return work(source, stored);
 }
 
-LevelSet import_raw(const fs::path& path, const RawLayout& layout, const ImportOptions& options,
-                    RunContext& context) {
+/// Opens raw samples and returns work(source, stored).
+template <class Work>
+auto with_raw(const fs::path& path, const RawLayout& layout, RunContext& context, Work&& work) {
   ByteSource source(path);
   StoredSamples stored{
       .file = path.string(), .dims = layout.dims, .format = layout.format, .offset = layout.offset};
@@ -549,9 +642,81 @@ LevelSet import_raw(const fs::path& path, const RawLayout& layout, const ImportO
   };
   // The length of gzip data is known only at their end.
   if (!source.gzipped() && source.at_most() != layout.offset + bytes) throw too_long();
-  LevelSet volume = read_stored(source, stored, options, context);
+  auto result = work(source, stored);
   if (!source.at_end(context)) throw too_long();
-  return volume;
+  return result;
+}
+
+}  // namespace
+
+/// The grid behind ImportedLabels.
+struct LabelGrid {
+  openvdb::Int32Grid::ConstPtr grid;
+};
+
+namespace {
+
+/// Reads the samples from the source, which is at or before the first, as labels.
+ImportedLabels read_stored_labels(ByteSource& source, const StoredSamples& stored,
+                                  const ImportOptions& options, RunContext& context) {
+  const Stage stage(context, "read volume");
+  initialize_openvdb();
+  const std::vector<std::int32_t> values = read_labels(source, stored, options, context);
+  ImportedLabels result{};
+  std::int32_t last = 0;
+  std::uint64_t* count = nullptr;
+  for (const std::int32_t label : values) {
+    if (label == 0) continue;
+    if (!count || label != last) last = label, count = &result.samples[static_cast<std::uint32_t>(label)];
+    ++*count;
+  }
+  if (result.samples.empty()) throw Error(joined(stored.file, " holds no label: all of its samples are 0"));
+  const auto grid = make_grid<openvdb::Int32Grid>(
+      stored, 0, context, [&](const openvdb::Coord& lower) { return make_leaf(values, stored.dims, lower); });
+  describe(*grid, stored);
+  grid->setName("labels");
+  for (int axis = 0; axis < 3; ++axis) result.dims[axis] = static_cast<int>(stored.dims[axis]);
+  result.voxel_size = std::cbrt(std::abs(stored.to_world.topLeftCorner<3, 3>().determinant()));
+  result.grid = std::make_shared<const LabelGrid>(LabelGrid{grid});
+  return result;
+}
+
+}  // namespace
+
+bool is_nifti_path(const fs::path& path) {
+  const std::string extension = unpacked_name(path).second;
+  return extension == ".nii" || extension == ".hdr" || extension == ".img";
+}
+
+LevelSet import_nifti(const fs::path& path, const ImportOptions& options, RunContext& context) {
+  return with_nifti(path, options, context, [&](ByteSource& source, const StoredSamples& stored) {
+    return read_stored(source, stored, options, context);
+  });
+}
+
+ImportedLabels import_nifti_labels(const fs::path& path, const ImportOptions& options, RunContext& context) {
+  return with_nifti(path, options, context, [&](ByteSource& source, const StoredSamples& stored) {
+    return read_stored_labels(source, stored, options, context);
+  });
+}
+
+LevelSet import_raw(const fs::path& path, const RawLayout& layout, const ImportOptions& options,
+                    RunContext& context) {
+  return with_raw(path, layout, context, [&](ByteSource& source, const StoredSamples& stored) {
+    return read_stored(source, stored, options, context);
+  });
+}
+
+ImportedLabels import_raw_labels(const fs::path& path, const RawLayout& layout, const ImportOptions& options,
+                                 RunContext& context) {
+  return with_raw(path, layout, context, [&](ByteSource& source, const StoredSamples& stored) {
+    return read_stored_labels(source, stored, options, context);
+  });
+}
+
+void write_imported(const fs::path& path, const ImportedLabels& labels, RunContext& context) {
+  const Stage stage(context, "write volume");
+  write_grids(path, {labels.grid->grid});
 }
 
 void write_imported(const fs::path& path, const LevelSet& volume, RunContext& context) {

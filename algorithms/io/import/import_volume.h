@@ -5,7 +5,9 @@
 // takes index coordinates to millimetres. Its class is "unknown", since its values are not distances. Its
 // background is 0 if all values are positive, and else the next single precision below the smallest: values
 // greater than an isovalue are inside. Metadata give the source: hermesh_source (the file's name without
-// directories), hermesh_sample_type, hermesh_minimum and hermesh_maximum, the bounds of useful isovalues.
+// directories), hermesh_sample_type, hermesh_minimum and hermesh_maximum, the bounds of useful isovalues. If
+// integer samples look like labels (few values, nearly all equal to their neighbours), a note recommends to
+// import them as such.
 //
 // Debian's libniftiio is not used: it writes errors to stderr, allocates the memory that a header claims
 // before it checks the file, and multiplies dimensions unchecked.
@@ -14,6 +16,8 @@
 #include <array>
 #include <cstdint>
 #include <filesystem>
+#include <map>
+#include <memory>
 #include <optional>
 #include <string>
 
@@ -72,6 +76,28 @@ struct RawLayout {
 /// wrong dimensions.
 LevelSet import_raw(const std::filesystem::path& path, const RawLayout& layout, const ImportOptions& options,
                     RunContext& context);
+
+struct LabelGrid;
+
+/// A label map as read from a file: a grid `labels` of 32-bit integers, in which the voxels of labels are
+/// active and the background is 0. Metadata and transform are those of a scalar volume.
+struct ImportedLabels {
+  std::array<int, 3> dims;                         ///< samples of the file
+  double voxel_size;                               ///< millimetres, cube root of the voxel's volume
+  std::map<std::uint32_t, std::uint64_t> samples;  ///< number of samples of each label
+  std::shared_ptr<const LabelGrid> grid;
+};
+
+/// Imports the samples of a file like import_nifti() and import_raw(), as labels: whole numbers from 0, the
+/// background, to 2147483647.
+/// @throws Error as these, for a sample that is no label, and for a file without a label; Cancelled
+ImportedLabels import_nifti_labels(const std::filesystem::path& path, const ImportOptions& options,
+                                   RunContext& context);
+ImportedLabels import_raw_labels(const std::filesystem::path& path, const RawLayout& layout,
+                                 const ImportOptions& options, RunContext& context);
+
+/// Writes a label map atomically. @throws Error if the path cannot be written.
+void write_imported(const std::filesystem::path& path, const ImportedLabels& labels, RunContext& context);
 
 /// Writes the grid atomically with its name (`volume` after an import) and metadata. @throws Error if the
 /// path cannot be written.
