@@ -232,7 +232,7 @@ void note_likely_labels(const std::vector<float>& values, const StoredSamples& s
                         float highest, RunContext& context) {
   constexpr float kMostLabel = 65535.0f;
   constexpr std::size_t kMostValues = 256;
-  constexpr double kMostChanges = 0.05;
+  constexpr double kMostChanges = 0.2;
   const bool is_integer =
       stored.format.type != NumberType::float32 && stored.format.type != NumberType::float64;
   if (!is_integer || lowest != 0.0f || highest > kMostLabel || stored.slope != std::floor(stored.slope) ||
