@@ -81,13 +81,15 @@ class SurfaceDistance {
   double at(const Eigen::Vector3d& p, double most) const;
 
   const TriangleTree& tree() const { return tree_; }
+  /// Largest error of a distance that is due to rounding, in the units of the points.
+  double rounding() const { return rounding_; }
 
  private:
   struct Piece;
   class Walk;
 
   TriangleTree tree_;
-  double rounding_ = 0.0;  ///< largest error of distances
+  double rounding_ = 0.0;
 };
 
 }  // namespace hermesh

@@ -307,6 +307,9 @@ int run_batch(const CLI::App& command, CommandFiles& files, Session& session) {
     throw UsageError(
         "--format concerns standard streams; --pattern gives the format of many outputs, such as "
         "{stem}.obj");
+  if (const CLI::Option* certificate = command.get_option_no_throw("--certificate");
+      certificate && certificate->count() > 0)
+    throw UsageError("--certificate is a file for one output, and a batch has many");
   if (files.overwrite_input)
     throw UsageError("--overwrite-input has no effect: a batch never writes over its inputs");
   std::string pattern = files.pattern;

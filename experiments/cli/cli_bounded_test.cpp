@@ -114,6 +114,8 @@ TEST_F(CliBoundedTest, WrongUsageIsSaid) {
       {"--resolution", "10", "--over-holes"},
       {"--resolution", "10", "--except-thin"},
       {"--resolution", "10", "--through-volume"},
+      {"--resolution", "10", "--certificate", "proof"},
+      {"--error", "1%", "--certificate", "proof", "--scale", "2"},
       {"--resolution", "auto", "--error", "1%"},
       {"--resolution", "auto", "--voxel-size", "0.1"},
       {"--resolution", "automatic"},
@@ -124,6 +126,21 @@ TEST_F(CliBoundedTest, WrongUsageIsSaid) {
     run_to(2, words);
     EXPECT_EQ(files().count("out.ply"), 0u);
   }
+  run_to(2, "remesh cube.off out.glb --error 1% --certificate proof");  // the checker does not read glTF
+  run_to(2, "remesh cube.off --out-dir many --error 1% --certificate proof");
+  EXPECT_EQ(files().count("proof"), 0u);
+}
+
+// experiments/lab/tests/test_certificates.py verifies certificates.
+TEST_F(CliBoundedTest, ACertificateCoversBothMeshes) {
+  write_cube();
+  const Json report = json_of("remesh cube.off out.ply --error 1% --certificate proof --json");
+  const Json& certificate = report.at("result").at("certificate");
+  EXPECT_EQ(certificate.at("file"), "proof");
+  EXPECT_GE(certificate.at("pieces"), 24);  // 12 triangles each
+  EXPECT_EQ(certificate.at("uncovered_input"), 0.0);
+  EXPECT_EQ(certificate.at("uncovered_output"), 0.0);
+  EXPECT_EQ(files().count("proof"), 1u);
 }
 
 }  // namespace cli_bounded_test

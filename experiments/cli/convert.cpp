@@ -11,10 +11,12 @@
 #include "algorithms/extraction/explain.h"
 #include "algorithms/extraction/frustum.h"
 #include "algorithms/extraction/volume_attributes.h"
+#include "algorithms/io/mesh_file.h"
 #include "algorithms/io/vdb_file.h"
 #include "algorithms/io/written_precision.h"
 #include "algorithms/remesh/auto_voxel.h"
 #include "algorithms/remesh/bounded_remesh.h"
+#include "algorithms/remesh/certificate.h"
 #include "algorithms/remesh/height_field.h"
 #include "algorithms/remesh/tiled_remesh.h"
 #include "experiments/cli/cli11.h"
@@ -49,6 +51,7 @@ struct ConvertArguments {
   std::optional<double> most_points;
   bool through_volume = false;
   double smallest_voxel = 0.0;  ///< world units; 0: not given
+  std::string certificate;      ///< file; empty: none
   int tiles = 0;                ///< side of the tiles in voxels; 0: not given
   std::string tile;             ///< "I/N", the job; empty: not given
   // Solids other than that of the polygons: lengths, with % or a unit behind them; empty: not given.
@@ -493,6 +496,38 @@ void report_exceptions(const BoundedMesh& bounded, Session& session) {
   made(session, "excepted_area", bounded.excepted_area());
 }
 
+/// Returns true if validation/check_certificate.py reads a file: .off, .obj, .ply and .stl.
+bool can_be_checked(const std::string& path) { return is_mesh_path(path) && !states_unit(path); }
+
+/// @throws UsageError if a certificate cannot be about the files.
+void check_certificate_usage(const ConvertArguments& arguments, const Session& session) {
+  const Paths& paths = arguments.paths;
+  if (!can_be_checked(paths.in) || !can_be_checked(paths.out))
+    throw UsageError(
+        "a certificate is about two files, .off, .obj, .ply or .stl, but the command converts '" + paths.in +
+        "' to '" + paths.out + "'");
+  if (session.scale != 1.0 || !arguments.fill_below.empty())
+    throw UsageError("a certificate is about the input file, which --scale and --fill-below change");
+}
+
+/// Writes the certificate of a bounded mesh and reports what it does not cover.
+void certify(const ConvertArguments& arguments, const BoundedMesh& bounded, Session& session) {
+  const std::size_t notes = session.context.notes.size();
+  const MeshFile input = read_mesh_file(arguments.paths.in, session.context, {.triangle_numbers = true});
+  session.context.notes.resize(notes);  // they are those of the first time
+  const CertificateReport report =
+      write_certificate(arguments.certificate, input, bounded.mesh, bounded.error, session.context);
+  made(session, "certificate",
+       {{"file", arguments.certificate},
+        {"pieces", report.pieces},
+        {"uncovered_input", report.uncovered_input},
+        {"uncovered_output", report.uncovered_output}});
+  if (report.uncovered_input + report.uncovered_output > 0.0)
+    session.context.note("the certificate does not cover polygons of area " + text(report.uncovered_input) +
+                         ", such as those inside the solid, and an area of " + text(report.uncovered_output) +
+                         " of the mesh; its check needs --uncovered");
+}
+
 int run_bounded(const ConvertArguments& arguments, const CLI::App& command, Session& session) {
   refuse_idle(command,
               {"--tiles", "--tile", "--extractor", "-o", "--voxelizer", "--voxelizer-option",
@@ -516,6 +551,7 @@ int run_bounded(const ConvertArguments& arguments, const CLI::App& command, Sess
       .through_volume = arguments.through_volume,
       .except_thin = arguments.except_thin};
   check_mesh_output(paths.out);
+  if (!arguments.certificate.empty()) check_certificate_usage(arguments, session);
   const PolygonMesh mesh = read_input(arguments, session);
   const double diagonal = bounds(mesh).size().norm();
   const double bound_asked = error(diagonal);
@@ -561,6 +597,7 @@ int run_bounded(const ConvertArguments& arguments, const CLI::App& command, Sess
                              length_text(session, made.from_surface) + " of the mesh (" +
                              text(100.0 * bound / diagonal) + "% of the diagonal)" +
                              (made.excepted.empty() ? "" : ", EXCEPT at the places of a note"));
+  if (!arguments.certificate.empty()) certify(arguments, made, session);
   return save(arguments, made.mesh, mesh, session);
 }
 
@@ -630,6 +667,10 @@ void add_bound_options(CLI::App& command, CLI::App& size, ConvertArguments& argu
           "Smallest voxel size to try, in world units (default: an eighth of the error); the command "
           "fails if a wall or gap is too thin for it")
       ->check(CLI::PositiveNumber);
+  group->add_option(
+      "--certificate", arguments.certificate,
+      "Also write a proof of the bound to this file, which check_certificate.py verifies in exact "
+      "arithmetic, without hermesh");
 }
 
 void add_solid_options(CLI::App& command, ConvertArguments& arguments) {
@@ -710,7 +751,8 @@ void add_conversions(CLI::App& app, Session& session) {
           "--error with --triangles");
     if (arguments->triangles || !arguments->error.empty()) return run_bounded(*arguments, *command, session);
     refuse_idle(*command,
-                {"--over-holes", "--except-thin", "--through-volume", "--limit-points", "--smallest-voxel"},
+                {"--over-holes", "--except-thin", "--through-volume", "--limit-points", "--smallest-voxel",
+                 "--certificate"},
                 "it needs --error or --triangles");
     return run_remesh(*arguments, *command, session);
   });

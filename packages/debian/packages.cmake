@@ -56,6 +56,7 @@ This package holds the headers, which include the C++ standard library
 alone, and the files by which find_package(hermesh) of CMake finds all.")
 set(CPACK_DEBIAN_DEVELOPMENT_PACKAGE_DEPENDS "libhermesh1 ${same}")
 set(CPACK_DEBIAN_DEVELOPMENT_PACKAGE_RECOMMENDS libopenvdb-dev)
+set(CPACK_DEBIAN_PROGRAM_PACKAGE_SUGGESTS python3-numpy)  # for hermesh-check-certificate
 if(HERMESH_BUILD_VALIDATION)
   hermesh_package(validation libhermesh-validation1 libs
     "polygons to sparse volumes and back - judges of meshes"
