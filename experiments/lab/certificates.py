@@ -23,7 +23,8 @@ from .stale import measured_table
 
 MARGIN = 1.01  # by which a false statement exceeds the error
 MOST_TRIES = 200
-MOST_BYTES = 30e6  # of a file of $HERMESH_DATA, which takes a minute
+MOST_BYTES = 30e6  # of a file of $HERMESH_DATA
+MOST_SECONDS = 100  # of a command; a mesh that takes longer is not made
 
 _spec = importlib.util.spec_from_file_location("check_certificate", ROOT / "validation/check_certificate.py")
 checker = importlib.util.module_from_spec(_spec)
@@ -218,12 +219,15 @@ def sources(count, directory, hermesh):
 
 
 def make(hermesh, file, directory, error, options=()):
-    """Returns the files of a certified mesh and seconds; None if the program refuses the error."""
+    """Returns the files of a certified mesh and seconds; None if the program refuses the error or is slow."""
     files = file, directory / "output.ply", directory / "output.certificate"
     start = time.monotonic()
-    ended = subprocess.run([hermesh, "remesh", *files[:2], "--error", error, "--certificate", files[2],
-                            "--quiet", *options], capture_output=True)
-    return (files, time.monotonic() - start) if ended.returncode == 0 else (None, 0.0)
+    try:
+        subprocess.run([hermesh, "remesh", *files[:2], "--error", error, "--certificate", files[2], "--quiet",
+                        *options], capture_output=True, check=True, timeout=MOST_SECONDS)
+    except (subprocess.CalledProcessError, subprocess.TimeoutExpired):
+        return None, time.monotonic() - start
+    return files, time.monotonic() - start
 
 
 def untampered(files, seconds):
@@ -259,7 +263,7 @@ def measure(parameters, wants, program, progress):
                 progress(label)
                 files, seconds = make(hermesh, file, directory, error)
                 if not files:
-                    yield label, {"made": 0}, []
+                    yield label, {"made": 0, "making_seconds": seconds}, []
                     continue
                 values, wrong = untampered(files, seconds)
                 yield label, values | {"first_mistake": wrong[0] if wrong else ""}, wrong
@@ -290,7 +294,8 @@ MEASUREMENT = {
                    for name, default, text in (("models", 20, "number of models"),
                                                ("tampered", 20, "false certificates of each kind"))],
     "shown": measured_table("certificates, and what the checker says of them", "mesh or change", {
-        "made": "meshes with a certificate, or with one that was made false; 0: the error was refused",
+        "made": "meshes with a certificate, or with one that was made false; 0: the error was refused, or "
+                f"took more than {MOST_SECONDS} s",
         "refused": "of these, those that the checker refuses",
         "pieces": "pieces that are assigned to triangles",
         "uncovered_input, input not covered": "area of polygons that the certificate does not cover",
