@@ -4,18 +4,17 @@ point of it is farther from the input than the stated error, and no point of the
 
     check_certificate.py INPUT OUTPUT CERTIFICATE [--uncovered SHARE] [--json]
 
-The program reads the three files and nothing else, and shares no code with hermesh. Meshes are OFF, OBJ, PLY or
-STL files, also gzipped; their coordinates count as the doubles nearest to their text. All decisions are
-made in whole numbers of any length. Floating point only proposes points of triangles that are near enough, which
-is then tested exactly.
+The program reads the three files and nothing else, and shares no code with hermesh. Meshes are OFF, OBJ, PLY
+or STL files, also gzipped; their coordinates count as the doubles nearest to their text. All decisions are
+made in whole numbers of any length. Floating point only proposes points of triangles that are near enough,
+which is then tested exactly.
 
-  Closed, manifold:  each directed edge occurs once, and so does its reverse; the triangles at a vertex are one
-      fan; no triangle has area 0; the enclosed volume is positive.
-  No self-intersection:  two triangles whose boxes overlap have no point in common but shared vertices and edges.
+  Closed, manifold:  each directed edge occurs once, and so does its reverse; the triangles at a vertex are
+      one fan; no triangle has area 0; the enclosed volume is positive.
+  No self-intersection:  two triangles have no point in common but shared vertices and edges.
   Distance:  the certificate divides each triangle by lines into convex pieces and assigns each piece to a
-      triangle of the other mesh (hermesh, algorithms/remesh/certificate.h, has the format). If all corners of a
-      piece are within the error of its triangle, so is all of the piece: the distance from a convex set is a
-      convex function.
+      triangle of the other mesh (algorithms/remesh/certificate.h has the format). If all corners of a piece
+      are within the error of its triangle, so is all of the piece: the distance from a convex set is convex.
 
 Exit code: 0 if everything is verified, 1 if something is false or not proved, 2 if a file cannot be read.
 """
@@ -35,9 +34,9 @@ import numpy
 FORMAT = "hermesh certificate 1"
 BITS = 40  # of barycentric coordinates of proposed points
 BLOCK = 1 << 16  # rows in one step
-_TYPES = {"char": "i1", "uchar": "u1", "short": "i2", "ushort": "u2", "int": "i4", "uint": "u4", "float": "f4",
-          "double": "f8", "int8": "i1", "uint8": "u1", "int16": "i2", "uint16": "u2", "int32": "i4",
-          "uint32": "u4", "float32": "f4", "float64": "f8"}
+_TYPES = {"char": "i1", "uchar": "u1", "short": "i2", "ushort": "u2", "int": "i4", "uint": "u4",
+          "float": "f4", "double": "f8", "int8": "i1", "uint8": "u1", "int16": "i2", "uint16": "u2",
+          "int32": "i4", "uint32": "u4", "float32": "f4", "float64": "f8"}
 
 
 class Refused(Exception):
@@ -307,8 +306,8 @@ def check_embedding(triangles, points, exact):
         for number, corners in ((1, (1, 2)), (0, (0, 1, 2))):
             chosen, where = pairs[shared == number], same[shared == number]
             starts = [where.any(2 - side).argmax(1)[:, None] for side in (0, 1)]  # the shared vertex, or 0
-            numbers = [numpy.take_along_axis(triangles[chosen[:, side]], (starts[side] + numpy.arange(3)) % 3, 1)
-                       for side in (0, 1)]
+            turned = [(start + numpy.arange(3)) % 3 for start in starts]
+            numbers = [numpy.take_along_axis(triangles[chosen[:, side]], turned[side], 1) for side in (0, 1)]
             for first in (0, 1):
                 kept = ~on_one_side(exact[numbers[first]], exact[numbers[1 - first]], corners)
                 numbers, chosen = [each[kept] for each in numbers], chosen[kept]
@@ -416,8 +415,8 @@ def check_distance(found, mesh, other, squared, name):
                           > squared.numerator * (total * 2**BITS)**2, bool) | (proposed < 0).any(1)
         if far.any():
             row = numpy.flatnonzero(far)[0]
-            raise Refused(f"{name} {number[row]} is not shown to be within the error of triangle {target[row]} "
-                          "of the other mesh")
+            raise Refused(f"{name} {number[row]} is not shown to be within the error of triangle "
+                          f"{target[row]} of the other mesh")
 
 
 def share(uncovered, corners):
@@ -483,12 +482,12 @@ def main():
     if arguments.json:
         print(json.dumps({"verified": True} | made))
     else:
-        print(f"verified: {made['output_triangles']} triangles, closed, manifold and free of self-intersection; "
-              f"they and the {made['input_triangles']} triangles of the input are within {made['error']:.6g} of "
-              "each other")
+        print(f"verified: {made['output_triangles']} triangles, closed, manifold and free of "
+              f"self-intersection; they and the {made['input_triangles']} triangles of the input are within "
+              f"{made['error']:.6g} of each other")
         for name in ("output", "input"):
             if made[f"uncovered_{name}"] > 0:
-                print(f"except an area of {made[f'uncovered_{name}']:.4g} of the {name}, which is not covered")
+                print(f"except an area of {made[f'uncovered_{name}']:.4g} of the {name}, not covered")
     return 0
 
 

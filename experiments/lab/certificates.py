@@ -1,8 +1,8 @@
 """Certificates on trial: the measurement `trial_certificates`.
 
-Meshes are made within an error with a certificate, which validation/check_certificate.py must verify. Then a
-mesh, the error or the certificate is changed so that a statement is false, or not proved any more; all of these
-must be refused. Whether a change makes something false is decided here by distances between points and
+Meshes are made within an error with a certificate, which validation/check_certificate.py must verify. Then
+a mesh, the error or the certificate is changed so that a statement is false, or not proved any more; all of
+these must be refused. Whether a change makes something false is decided here by distances between points and
 triangles, in floating point and with a margin.
 """
 
@@ -74,7 +74,7 @@ def distance(point, corners):
     return numpy.linalg.norm((weights[:, :, None] * corners).sum(1) - point, axis=1).min()
 
 
-# ---- Changes. Each gets a state, which it may change, and returns it, or None if the statement may still hold.
+# ---- Changes. Each gets a state, which it may change, and returns it; None if the statement may still hold.
 
 def moved_vertex(made, state, random):
     points = made.output[0].copy()
@@ -256,7 +256,8 @@ def measure(parameters, wants, program, progress):
         for number, (name, file) in enumerate(sources(count, directory, hermesh)):
             if number == count:
                 break
-            for error in ("1%", "0.3%") if file.parent == directory else ("1%",):  # scans take minutes at 0.3%
+            # Scans take minutes at 0.3%.
+            for error in ("1%", "0.3%") if file.parent == directory else ("1%",):
                 label = f"{name}, {error}"
                 if not wants(label):
                     continue

@@ -22,8 +22,8 @@ import signal
 import sys
 import time
 
-from . import (ablations, certificates, child, compare, damage, experiment, faults, merge, metamorphic, models,
-               stale, tables, upkeep)
+from . import (ablations, certificates, child, compare, damage, experiment, faults, merge, metamorphic,
+               models, stale, tables, upkeep)
 from .child import DataMissing, InputUnreadable
 from .program import check_may_be_kept, load_program, provenance, sha256_of
 from .rows import ROOT, LabError, append_rows, drop_torn_row, find, read_rows, readable, text_at, to_json
@@ -31,8 +31,8 @@ from .rows import ROOT, LabError, append_rows, drop_torn_row, find, read_rows, r
 USUAL_SECONDS, USUAL_SHARE_OF_MEMORY = 3600, 0.8  # limits of a cell if neither the user nor the file has any
 MOST_SHARDS = 10_000
 OWN_MEASUREMENTS = {each["name"]: each for each in (
-    stale.MEASUREMENT, certificates.MEASUREMENT, damage.MEASUREMENT, faults.MEASUREMENT, metamorphic.MEASUREMENT,
-    *upkeep.MEASUREMENTS)}
+    stale.MEASUREMENT, certificates.MEASUREMENT, damage.MEASUREMENT, faults.MEASUREMENT,
+    metamorphic.MEASUREMENT, *upkeep.MEASUREMENTS)}
 
 
 # ---- Shards

@@ -26,7 +26,8 @@ UNIT = 2.0**-16  # of the coordinates of solids, whose longest side is then 2
 VOXEL = 2.0**-4
 MOST_SECONDS = 600
 # Method: words of the command, and what is stated of it: "tables" and "uniform" meshes depend on the
-# samples alone; "others" round where ours do not; "tolerance" is 0.1 voxel from the uniform mesh; "free" has no stated bound.
+# samples alone; "others" round where ours do not; "tolerance" is 0.1 voxel from the uniform mesh; "free" has
+# no stated bound.
 METHODS = {
     "marching-cubes": (["--extractor", "marching-cubes"], "tables"),
     "dual-contouring": (["--extractor", "dual-contouring"], "uniform"),
@@ -52,8 +53,8 @@ class Bench:
         self.program, self.directory = program, pathlib.Path(directory)
 
     def run(self, *words, threads=1):
-        ended = subprocess.run([self.program, *map(str, words), "--threads", str(threads)], cwd=self.directory,
-                               capture_output=True, text=True, timeout=MOST_SECONDS)
+        ended = subprocess.run([self.program, *map(str, words), "--threads", str(threads)],
+                               cwd=self.directory, capture_output=True, text=True, timeout=MOST_SECONDS)
         if ended.returncode not in (0, 3):
             raise Failed((ended.stderr.strip() or "no message").splitlines()[-1][:200])
         return ended
@@ -177,9 +178,10 @@ def finer(bench, mesh, words, random):
     return apart[1] <= apart[0], max(0.0, apart[1] - apart[0])
 
 
-# Relation: the function, and the largest distance in voxels that is no violation, by what is stated of a method.
-# Two meshes within a tenth of a voxel of the same uniform mesh are at most a fifth apart. A turned cell may be
-# triangulated otherwise: by a table up to its diagonal apart, in dual contouring where quads are not plane.
+# Relation: the function, and the largest distance in voxels that is no violation, by what is stated of a
+# method. Two meshes within a tenth of a voxel of the same uniform mesh are at most a fifth apart. A turned
+# cell may be triangulated otherwise: by a table up to its diagonal apart, in dual contouring where quads are
+# not plane.
 _EXACT, _ANY = {"uniform": 1e-3, "tables": 1e-3}, {"tolerance": 0.2, "others": 0.01, "free": 1.0}
 RELATIONS = {
     "number of threads": (threads, {}), "scale by a power of two": (scaled, {}),
@@ -188,7 +190,8 @@ RELATIONS = {
     "triangles divided": (split, _ANY | _EXACT),
     "symmetry of the cube": (turned, {"tables": 1.74, "uniform": 0.25, "others": 0.25, "tolerance": 0.45,
                                       "free": 1.0}),
-    "voxels halved": (finer, {"tables": 0.05, "uniform": 0.05, "others": 0.05, "tolerance": 0.1, "free": 1.0})}
+    "voxels halved": (finer, {"tables": 0.05, "uniform": 0.05, "others": 0.05, "tolerance": 0.1,
+                              "free": 1.0})}
 
 
 # ---- Relations of other commands. Each yields (what, error in voxels): volumes are compared per area.
@@ -313,7 +316,8 @@ def measure(parameters, wants, program, progress):
             values["worst"] = max(values["worst"], worst)
             if worst > bound:
                 broken.append(f"{name}: {what}, {worst:.4g}")
-        yield label, values | {"violations": len(broken), "first_mistake": broken[0] if broken else ""}, broken
+        values |= {"violations": len(broken), "first_mistake": broken[0] if broken else ""}
+        yield label, values, broken
 
 
 MEASUREMENT = {

@@ -21,8 +21,8 @@ class Identity(metamorphic.Bench):
         return metamorphic.in_order(corners), metamorphic._written(self, corners)
 
     def apart(self, first, second):  # of the boxes
-        points = [metamorphic.polygons.read(self.directory / name)[0].reshape(-1, 3) for name in (first, second)]
-        boxes = [numpy.concatenate([p.min(0), p.max(0)]) for p in points]
+        meshes = [metamorphic.polygons.read(self.directory / name)[0] for name in (first, second)]
+        boxes = [numpy.concatenate([corners.min((0, 1)), corners.max((0, 1))]) for corners in meshes]
         return numpy.abs(boxes[0] - boxes[1]).max() / metamorphic.VOXEL
 
 
