@@ -137,7 +137,7 @@ class Run:
             parts.append(group["voxelizer"]["label"])
         stated = self.experiment | self.tier | group["case"] | group
         return {"case": group["case"]["name"], "variants": variants,
-                "files": "-".join(experiment.file_name(str(part)) for part in parts),
+                "files": "-".join(experiment.file_name(str(part)) for part in parts).lstrip("-"),
                 **{key: stated[key] for key in experiment.OF_JOB}}
 
     def _input_hash(self, name, sweep=None):

@@ -2,9 +2,9 @@
 which test notices.
 
 A sample of all possible changes, the same at any time for the same files, is tried in a worktree of the last
-commit. Only the files that a mutant changes are compiled. The tests of its directory come first, then the
-default tier. The same command continues after an interruption, and shards can share the work. A mutant whose
-test program has the same bytes as before is equivalent; others are argued for in
+commit. Only the files that a mutant changes are compiled. The tests of its folder come first, then those of
+its directory, then the default tier. The same command continues after an interruption, and shards can share
+the work. A mutant whose test program has the same bytes as before is equivalent; others are argued for in
 experiments/changed_constants/equivalent_mutants.tsv, by their identity.
 """
 
@@ -103,10 +103,11 @@ class Bench:
             subprocess.run(["git", "worktree", "add", "--quiet", "--detach", self.tree, "HEAD"], cwd=ROOT,
                            check=True)
         self.commit = self.run("git", "rev-parse", "HEAD").stdout.strip()
-        self.digests = {}
+        self.digests, self.seconds = {}, {}  # by directory: of the program, and most of its tests
 
     def run(self, *command, seconds=SECONDS):
-        return subprocess.run(command, cwd=self.tree, capture_output=True, text=True, timeout=seconds)
+        return subprocess.run(command, cwd=self.tree, capture_output=True, text=True, errors="replace",
+                              timeout=seconds)
 
     def build(self, *targets, seconds=SECONDS):
         """Returns why the build failed, or ""."""
@@ -126,9 +127,27 @@ class Bench:
         failed = re.findall(r"^\s*\d+ - (\S+) \(", tested.stdout, re.M)
         return (failed[0] if failed else "ctest") if tested.returncode else ""
 
+    def program(self, directory):
+        return self.tree / f"build/release/{directory}/{directory}_test"
+
     def digest(self, directory):
-        program = self.tree / f"build/release/{directory}/{directory}_test"
-        return hashlib.sha256(program.read_bytes()).hexdigest()
+        return hashlib.sha256(self.program(directory).read_bytes()).hexdigest()
+
+    def test_directory(self, directory, folder=None):
+        """Returns the name of the first test of a directory that fails, or ""; a folder's come first."""
+        own = {suite for path in (folder.glob("*_test.cpp") if folder else ())
+               for suite in re.findall(r"^TEST\w*\((\w+),", path.read_text(), re.M)}
+        for tests in filter(None, (":".join(f"{suite}.*:*/{suite}.*" for suite in sorted(own)), "*")):
+            try:
+                tested = self.run(self.program(directory), f"--gtest_filter={tests}-Slow.*",
+                                  "--gtest_fail_fast", "--gtest_brief=1",
+                                  seconds=self.seconds.get(directory, SECONDS))
+            except subprocess.TimeoutExpired:
+                return "time limit"
+            if tested.returncode:
+                failed = re.search(r"^\[  FAILED  \] ([^\s,]+)", tested.stdout, re.M)
+                return failed[1] if failed else f"exit code {tested.returncode}"
+        return ""
 
     def prepare(self, directories, say):
         """Builds the tests of the commit, which must succeed."""
@@ -137,8 +156,10 @@ class Bench:
             raise LabError(f"cmake failed: {configured.stderr.strip()[-300:]}")
         for directory in directories:
             say(f"building {directory}_test without a mutant")
-            if why := self.build(f"{directory}_test", seconds=None) or self.test("-L", directory):
+            why, start = self.build(f"{directory}_test", seconds=None), time.monotonic()
+            if why := why or self.test_directory(directory):
                 raise LabError(f"the tests of {directory} fail without a mutant: {why}")
+            self.seconds[directory] = min(SECONDS, 60 + 3 * (time.monotonic() - start))
             self.digests[directory] = self.digest(directory)
 
     def attempt(self, mutant, tier):
@@ -153,7 +174,7 @@ class Bench:
                 return ("noticed", why) if why.startswith("time") else ("not compiled", "")
             if self.digest(directory) == self.digests[directory]:
                 return "equivalent", "the same machine code"
-            if test := self.test("-L", directory):
+            if test := self.test_directory(directory, path.parent):
                 return "noticed", test
             if tier == "directory":
                 return "survived its directory", ""

@@ -74,12 +74,14 @@ class Run(unittest.TestCase):
             if command[0] == "ninja":
                 code = int("std::max" in text)  # a mutant that does not compile
                 program.write_text(text.replace(";;", ";").replace("  ;\n  ;", ""))
-            if command[0] == "ctest":
+            if command[0] in ("ctest", program):
                 if self.interrupted and text != SOURCE:
                     raise KeyboardInterrupt
-                self.tried.append((text, "-L" in command))
-                if "<= " in text or "-L" not in command and "y()" in text:
+                self.tried.append((text, command))
+                if command[0] == "ctest" and "y()" in text:
                     code, out = 8, "The following tests FAILED:\n\t  3 - Near.Point (Failed)\n"
+                if command[0] == program and "<= " in text:
+                    code, out = 1, "[  FAILED  ] Near.Point (3 ms)\n"
             return subprocess.CompletedProcess(command, code, out or "commit\n", "")
 
         self.enterContext(mock.patch.object(mutants.Bench, "run", run))
@@ -104,6 +106,12 @@ class Run(unittest.TestCase):
         self.assertIn(("not compiled", ""), found.values())
         self.assertIn("| all | all | 3 |", out)
         self.assertEqual(self.source.read_text(), SOURCE)
+
+    def test_the_tests_of_its_folder_come_first(self):
+        (self.source.parent / "near_test.cpp").write_text("TEST(Near, Point) {}\nTEST_P(All, Point) {}\n")
+        self.command()
+        first = next(command for text, command in self.tried if "<= " in text)
+        self.assertIn("--gtest_filter=All.*:*/All.*:Near.*:*/Near.*-Slow.*", first)
 
     def test_resumes_and_is_sharded(self):
         self.interrupted = True
