@@ -60,8 +60,14 @@ void measure_distances(const TriangleSoup& soup, const TriangleTree& tree, const
   const Stage stage(context, "certified distances");
   const double gap =
       options.certify_gap > 0.0 ? options.certify_gap : 1e-4 * reference_tree.bounds().diagonal();
-  report.certified_to_reference = certified_distance(soup, reference_tree, gap, context);
-  report.certified_from_reference = certified_distance(reference, tree, gap, context);
+  // The search ends within the gap, below which a sample may be farther away than what it found.
+  const auto certified = [&](const TriangleSoup& from, const TriangleTree& to, const Distances& sampled) {
+    HausdorffBound bound = certified_distance(from, to, gap, context);
+    bound.lower = std::max(bound.lower, std::min(sampled.max, bound.upper));
+    return bound;
+  };
+  report.certified_to_reference = certified(soup, reference_tree, *report.to_reference);
+  report.certified_from_reference = certified(reference, tree, *report.from_reference);
 }
 
 // Fills the results that require a surface with triangles.
@@ -130,17 +136,19 @@ class Verdict {
 
   void overall() {
     if (r_.triangles + r_.quads == 0) return say("The mesh has no polygons");
-    std::string text = "The mesh is ";
-    text += r_.closed() ? "closed, " : "not closed, ";
-    text += r_.manifold() ? "manifold, " : "not manifold, ";
-    text += r_.oriented() ? "oriented" : "not oriented";
-    if (!r_.self_intersections)
-      text += "; it was not searched for self-intersections";
-    else if (r_.watertight())
-      text += " and free of self-intersections: it is watertight";
-    else
-      text +=
-          r_.self_intersections->pairs == 0 ? " and free of self-intersections" : ", and intersects itself";
+    std::string has, lacks;
+    const auto add = [&](bool holds, const char* property) {
+      std::string& list = holds ? has : lacks;
+      list += (list.empty() ? "" : ", ") + std::string(property);
+    };
+    add(r_.closed(), "closed");
+    add(r_.manifold(), "manifold");
+    add(r_.oriented(), "oriented");
+    if (r_.self_intersections) add(r_.self_intersections->pairs == 0, "free of self-intersections");
+    std::string text = "The mesh is " + has;
+    if (!lacks.empty()) text += (has.empty() ? "not " : "; it is not ") + lacks;
+    if (!r_.self_intersections) text += "; it was not searched for self-intersections";
+    if (r_.watertight()) text += ": it is watertight";
     say(text);
   }
 

@@ -63,7 +63,8 @@ std::string explanation(const BoundedMesh& refused) {
   switch (first.why) {
     case Unmet::hole:
       return at + "the polygons have a hole there, which has to be closed;" + distance +
-             "; give --over-holes to let the bound hold elsewhere, or --except-thin to except this place";
+             "; give --over-holes to let the bound hold elsewhere, --except-thin to except this place, or "
+             "--signs flood-fill for a shell around the polygons";
     case Unmet::thin:
       break;
   }

@@ -69,6 +69,9 @@ constexpr double kShellVoxel = 0.5;
 /// Share of the excepted area from which on smaller voxels are not worth another attempt.
 constexpr double kWorthFiner = 0.75;
 
+/// Area of the holes, as a share of the polygons', from which on these are open sheets and no solid.
+constexpr double kOpenSheet = 0.1;
+
 /// A mesh to collapse, first the uniform one at a voxel size, and the surface that it approximates.
 struct Attempt {
   double voxel_size;
@@ -663,8 +666,9 @@ BoundedMesh bounded_remesh(const PolygonMesh& mesh, const BoundedRemeshOptions& 
   BoundedMesh made = remesher.run();
   const bool has_hole =
       std::ranges::any_of(made.unmet, [](const UnmetPlace& p) { return p.why == Unmet::hole; });
-  if (has_hole && options.thin == ThinRule::keep && options.signs == SignRule::winding_number) {
-    // Open parts then enclose nothing, and become shells.
+  if (has_hole && options.thin == ThinRule::keep && options.signs == SignRule::winding_number &&
+      made.hole_area > kOpenSheet * made.area) {
+    // Open parts then enclose nothing, and become shells. A solid with small holes would become one, too.
     BoundedRemeshOptions open = options;
     open.signs = SignRule::flood_fill;
     context.notes.resize(notes);

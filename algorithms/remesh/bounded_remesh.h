@@ -53,7 +53,8 @@ struct BoundedRemeshOptions {
   double smallest_voxel = 0.0;     ///< world units; 0: an eighth of the error
   bool written_in_single = false;  ///< as in ExtractionInput
   /// With ThinRule::keep all polygons count that do not have the solid on both sides: thin and open parts are
-  /// thickened within the error. Holes that may not be closed then make the polygons around them open parts.
+  /// thickened within the error. Holes that may not be closed and have more than a tenth of the polygons'
+  /// area then make the polygons around them open parts.
   ThinRule thin = ThinRule::drop;
   /// True if a volume is made even where the polygons are a valid mesh already.
   bool through_volume = false;

@@ -174,6 +174,19 @@ TEST(BoundedRemesh, AHoleIsRefusedWithItsPlaceUnlessItMayBeClosed) {
   EXPECT_FALSE(closed.mesh.empty());
 }
 
+TEST(BoundedRemesh, ASolidWithASmallHoleDoesNotBecomeAShell) {
+  PolygonMesh tall = box(Vector3d(0, 0, -9), Vector3d(1, 1, 1)),
+              flat = box(Vector3d(0, 0, 0.5), Vector3d(1, 1, 1));
+  open_lid(tall);
+  open_lid(flat);
+  const BoundedRemeshOptions keep{.error = 0.05, .thin = ThinRule::keep};
+  // The hole of the first has a fortieth of the polygons' area, that of the second a third.
+  const BoundedMesh refused = remesh(tall, keep);
+  ASSERT_FALSE(refused.unmet.empty());
+  EXPECT_EQ(refused.unmet.front().why, Unmet::hole);
+  EXPECT_FALSE(reached(flat, keep).mesh.empty());
+}
+
 TEST(BoundedRemesh, AWallTooThinIsRefusedWithItsThickness) {
   const PolygonMesh wall = box(Vector3d(0, 0, 0.01), Vector3d(1, 1, 0.0104));
   const BoundedMesh refused = remesh(wall, {.error = 0.05});
