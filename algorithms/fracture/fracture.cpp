@@ -27,7 +27,7 @@ void settle(LabelledSolid& solid, const Cutters& cutters, const FractureOptions&
                                sliver.samples});
     result.split_off += found.split_off;
     // Repair is the last step of a pass, so that all cells are simple when this function returns.
-    const RepairReport repaired = repair_labels(solid, context);
+    const RepairReport repaired = repair_labels(solid, context, options.from_voxels.has_value());
     result.repair.cells += repaired.cells;
     result.repair.changed_samples += repaired.changed_samples;
     result.repair.forced_changes += repaired.forced_changes;

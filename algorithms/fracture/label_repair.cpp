@@ -1,6 +1,7 @@
 #include "algorithms/fracture/label_repair.h"
 
 #include <algorithm>
+#include <bit>
 #include <limits>
 #include <map>
 #include <optional>
@@ -48,20 +49,26 @@ struct Change {
   std::uint32_t label = 0;
 };
 
-/// The two phases of label_repair.h, "Why it ends". Everything runs in one thread but the search for the
-/// first cells, whose result is put in order of blocks: the order of changes decides the outcome.
+/// Returns the number of samples that a change concerns.
+int size_of(const Change& change) { return std::popcount(static_cast<unsigned>(change.corners)); }
+
+/// The phases of label_repair.h, "Termination". Everything runs in one thread except for the search for the
+/// first cells, whose result is put in order of blocks, because the result depends on the order of changes.
 class Repair {
  public:
-  Repair(LabelledSolid& solid, RunContext& context) : solid_(solid), context_(context) {}
+  Repair(LabelledSolid& solid, bool near_boundary, RunContext& context)
+      : solid_(solid), context_(context), near_boundary_(near_boundary) {}
 
   RepairReport run() {
     std::vector<Place> cells = find_cells();
     report_.cells = cells.size();
-    // The first phase makes only changes that reduce the number of cells that are not simple. A cell that no
-    // change improves waits, and is tried again when a cell next to it has changed.
-    std::vector<Place> waiting = run_rounds(cells, [&](const Place& cell) { return better(cell); });
-    // The second phase lowers labels; lower() always succeeds, so no cell is left.
-    run_rounds(waiting, [&](const Place& cell) { return lower(cell); });
+    // Changes away from the boundary come last, because the repair of adjacent cells may make them
+    // unnecessary.
+    if (near_boundary_) {
+      cells = run_phases(std::move(cells));
+      near_boundary_ = false;
+    }
+    run_phases(std::move(cells));
     // A sample that was changed and later changed back does not count.
     for (const auto& [key, before] : before_)
       report_.changed_samples +=
@@ -73,6 +80,16 @@ class Repair {
   using Cells = std::vector<Place>;
   static bool before(const Place& a, const Place& b) {
     return std::pair(a.block, a.sample) < std::pair(b.block, b.sample);
+  }
+
+  /// Repairs the given cells. Returns those that are not simple afterwards: none, unless only changes near
+  /// the boundary are allowed.
+  Cells run_phases(Cells cells) {
+    // The first phase makes only changes that reduce the number of cells that are not simple. A cell that no
+    // change improves waits, and is tried again when a cell next to it has changed.
+    Cells waiting = run_rounds(std::move(cells), [&](const Place& cell) { return better(cell); });
+    // The second phase lowers labels. Without `near_boundary_`, lower() always succeeds, so no cell is left.
+    return run_rounds(std::move(waiting), [&](const Place& cell) { return lower(cell); });
   }
 
   CornerLabels labels(const Place& cell) const { return corner_labels(solid_, cell); }
@@ -189,15 +206,46 @@ class Repair {
     }
   }
 
-  /// The changes that are tried at a cell: one inside corner takes another label of the cell, or all inside
-  /// corners of a connected set take a label of one of them. None changes the outside or introduces a label
-  /// that the cell does not have.
-  static std::vector<Change> changes(const CornerLabels& corners) {
+  /// Returns true if a sample and its six neighbours have one code, so that the sample is more than half a
+  /// voxel away from the boundary between the voxels of different codes.
+  bool is_away(const Place& at) const {
+    const std::uint32_t code = solid_.codes(at.block, at.sample);
+    for (const int step : {-1, 1})
+      for (const Place& next : {moved(at, step, 0, 0), moved(at, 0, step, 0), moved(at, 0, 0, step)})
+        if (next.block < 0 || solid_.codes(next.block, next.sample) != code) return false;
+    return true;
+  }
+
+  /// Returns the changes near the boundary: any inside corners of other labels take a label of the cell, but
+  /// those away from the boundary only the one of their code. The changes of the fewest samples come first.
+  std::vector<Change> changes_near_boundary(const Place& cell, const CornerLabels& corners,
+                                            const std::vector<std::uint32_t>& present) const {
+    std::vector<Change> result;
+    int near = 0;
+    for (int c = 0; c < 8; ++c) near |= (corners[c] > 0 && !is_away(corner(cell, c))) << c;
+    for (const std::uint32_t label : present) {
+      int free = 0;
+      for (int c = 0; c < 8; ++c) {
+        if (corners[c] == 0 || corners[c] == label) continue;
+        const Place at = corner(cell, c);
+        free |= (((near >> c) & 1) || solid_.code_of[label] == solid_.codes(at.block, at.sample)) << c;
+      }
+      for (int set = free; set > 0; set = (set - 1) & free) result.push_back({set, label});
+    }
+    std::ranges::stable_sort(result, {}, size_of);
+    return result;
+  }
+
+  /// The changes that are tried at a cell, if they need not be near the boundary: one inside corner takes
+  /// another label of the cell, or all inside corners of a connected set take a label of one of them. None
+  /// changes the outside or introduces a label that the cell does not have.
+  std::vector<Change> changes(const Place& cell, const CornerLabels& corners) const {
     std::vector<Change> result;
     std::vector<std::uint32_t> present(corners.begin(), corners.end());
     std::sort(present.begin(), present.end());
     present.erase(std::unique(present.begin(), present.end()), present.end());
     std::erase(present, 0u);
+    if (near_boundary_) return changes_near_boundary(cell, corners, present);
     int seen = 0;
     for (int c = 0; c < 8; ++c) {
       if (corners[c] == 0) continue;
@@ -213,32 +261,38 @@ class Repair {
   }
 
   /// Makes the change that leaves the fewest cells not simple (of several equal ones, the first), if it
-  /// reduces their number. Returns true if it made a change.
+  /// reduces their number; near the boundary, the best of those that change the fewest samples. Returns true
+  /// if it made a change.
   bool better(const Place& cell) {
     std::optional<Change> best;
     int least = 0;
-    for (const Change& change : changes(labels(cell)))
+    for (const Change& change : changes(cell, labels(cell))) {
+      if (near_boundary_ && best && size_of(change) > size_of(*best)) break;
       if (const int more = effect(cell, change).more; more < least) least = more, best = change;
+    }
     if (best) apply(cell, *best);
     return best.has_value();
   }
 
   /// Makes the cell simple by a change that raises no label; of those the one that spoils the fewest others.
-  /// If there is none, every part of the inside corners takes its lowest label. Returns true.
+  /// If there is none, every part of the inside corners takes its lowest label, unless only changes near the
+  /// boundary are allowed. Returns true if it made a change.
   bool lower(const Place& cell) {
     const CornerLabels corners = labels(cell);
     std::optional<Change> best;
     int least = std::numeric_limits<int>::max();
-    for (const Change& change : changes(corners)) {
+    for (const Change& change : changes(cell, corners)) {
       bool lowers = true;
       for (int c = 0; c < 8; ++c)
         if ((change.corners >> c) & 1) lowers = lowers && change.label <= corners[c];
       // Only such changes are allowed here, so that the sum of all labels falls: nothing else ends this
       // phase.
       if (!lowers) continue;
+      if (near_boundary_ && best && size_of(change) > size_of(*best)) break;
       if (const Effect then = effect(cell, change); then.mends && then.more < least)
         least = then.more, best = change;
     }
+    if (!best && near_boundary_) return false;
     ++report_.forced_changes;
     if (best) {
       apply(cell, *best);
@@ -257,6 +311,7 @@ class Repair {
 
   LabelledSolid& solid_;
   RunContext& context_;
+  bool near_boundary_;  ///< true as long as only changes near the boundary are allowed
   RepairReport report_;
   std::vector<Place> changed_;                     ///< samples, in this round
   std::map<std::uint64_t, std::uint32_t> before_;  ///< first labels of changed samples, by block and sample
@@ -289,9 +344,9 @@ bool is_simple(const LabelledSolid& solid, const LabelledSolid::Place& cell) {
   return true;
 }
 
-RepairReport repair_labels(LabelledSolid& solid, RunContext& context) {
+RepairReport repair_labels(LabelledSolid& solid, RunContext& context, bool near_boundary) {
   const Stage stage(context, "repair labels");
-  return Repair(solid, context).run();
+  return Repair(solid, near_boundary, context).run();
 }
 
 }  // namespace hermesh

@@ -49,6 +49,13 @@
 // connect gets the lowest of its labels, after which the cell has no cut. A cell that is not simple has a
 // cut, so such a set has two labels and some label becomes lower; the sum of all labels cannot decrease for
 // ever either.
+//   Label maps need two more phases before these, which leave samples away from the boundary between
+// codes unchanged, i.e. those whose six neighbours have their code: a vertex next to such a sample would be
+// more than half a voxel away from that boundary. The two phases are like the others, except that they try
+// any set of the inside corners of a cell, the smallest first, and that the second leaves a cell unchanged
+// if no change makes it simple. They end for the same reasons: the first reduces the number of cells that
+// are not simple, and each change of the second lowers a label and raises none. The remaining cells are
+// those with which the other two phases begin, after which every cell is simple as before.
 #pragma once
 
 #include <cstdint>
@@ -68,15 +75,16 @@ bool is_simple(const LabelledSolid& solid, const LabelledSolid::Place& cell);
 struct RepairReport {
   std::uint64_t cells = 0;            ///< cells that were not simple before the repair
   std::uint64_t changed_samples = 0;  ///< samples whose label is another one after it
-  /// How often the second phase ("Why it ends") changed a cell, towards lower labels; a cell may count
-  /// several times.
+  /// How often a phase that lowers labels ("Termination") changed a cell; a cell may count several times.
   std::uint64_t forced_changes = 0;
 };
 
 /// Changes labels of inside samples until every cell is simple. Each round visits cells in ascending order of
 /// block and sample, the first round all that are not simple and the next ones those around changed samples.
 /// One thread makes the changes, so the result is the same at any thread count. A piece may lose all its
-/// samples or fall apart (label_components.h). @throws Cancelled.
-RepairReport repair_labels(LabelledSolid& solid, RunContext& context);
+/// samples or fall apart (label_components.h). With `near_boundary`, a sample whose six neighbours have its
+/// code gets the label of another code only where the cells cannot be made simple without that.
+/// @throws Cancelled.
+RepairReport repair_labels(LabelledSolid& solid, RunContext& context, bool near_boundary = false);
 
 }  // namespace hermesh

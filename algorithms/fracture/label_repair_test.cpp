@@ -57,14 +57,14 @@ bool all_simple(const LabelledSolid& solid) {
 
 TEST(LabelRepair, EndsOnNoiseAndTouchesNoOutside) {
   std::mt19937 random(3);
-  for (int trial = 0; trial < 6; ++trial) {
-    const CutCode kinds = 2 + static_cast<CutCode>(trial);
+  for (int trial = 0; trial < 12; ++trial) {
+    const CutCode kinds = 2 + static_cast<CutCode>(trial / 2);
     LabelledSolid solid = labelled(random_blobs(random), [&](int x, int y, int z) {
       return hashed(static_cast<std::uint64_t>(x * 1000003 + y * 1009 + z)) % kinds;
     });
     const HermiteView::Blocks before = solid.blocks;
     RunContext context;
-    const RepairReport report = repair_labels(solid, context);
+    const RepairReport report = repair_labels(solid, context, trial % 2 == 1);
     EXPECT_GT(report.changed_samples, 0u);
     ASSERT_TRUE(all_simple(solid));
     for (std::int32_t b = 0; b < static_cast<std::int32_t>(before.size()); ++b)

@@ -31,7 +31,8 @@ inline constexpr double kLeastSmoothing = 0.01;
 /// samples of the background never do.
 ///
 /// Vertices are at most LabelMeshOptions::smoothing from the boundary between voxels, except for the vertices
-/// of cells with several sheets of surface (at most 1/2) and those around samples whose labels changed.
+/// of cells with several sheets of surface (at most 1/2) and those around samples whose labels changed (at
+/// most 1/2 if all of these have a neighbour with another label in the map).
 struct LabelMeshes {
   /// A label, in ascending order.
   struct Label {

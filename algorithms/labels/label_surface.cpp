@@ -356,13 +356,11 @@ std::optional<CutCrossing> LabelSurface::crossing(const At& at, int axis, CutCod
   return CutCrossing{crossings_[first_[static_cast<std::size_t>(block)] + own.rank(axis, sample)], -1};
 }
 
-std::optional<CutCrossing> LabelSurface::nearest(const At& at, int axis, CutCode first,
-                                                 CutCode second) const {
+std::optional<CutCrossing> LabelSurface::nearest(const At& at, int axis, CutCode first, CutCode) const {
   const At lower = {at[0] & ~7, at[1] & ~7, at[2] & ~7};
   const std::int32_t block = block_at(lower);
   if (block < 0) return std::nullopt;
   const std::uint32_t own = label(block, sample_index(at[0] & 7, at[1] & 7, at[2] & 7), 3);
-  if ((own == first) == (own == second)) return std::nullopt;
   EdgeCrossing crossing{own == first ? 1.0f : 0.0f, {}};
   crossing.normal[static_cast<std::size_t>(axis)] = 1.0f;
   return CutCrossing{crossing, -1};

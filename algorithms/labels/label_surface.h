@@ -44,7 +44,7 @@ class LabelSurface : public Cutters {
   void codes(const At& lower, std::span<CutCode, 512> codes) const override;
   /// Returns the crossing of an edge between two labels, whichever pieces its samples belong to.
   std::optional<CutCrossing> crossing(const At& at, int axis, CutCode first, CutCode second) const override;
-  /// Returns the end of an edge within one label whose sample belongs to the piece of another.
+  /// Returns an end of an edge within one label whose sample belongs to the piece of another.
   std::optional<CutCrossing> nearest(const At& at, int axis, CutCode first, CutCode second) const override;
   std::size_t count() const override { return 0; }
   std::string name(std::size_t) const override { return {}; }

@@ -243,6 +243,32 @@ TEST(LabelMaps, RandomMapsAreComplexes) {
   print(totals);
 }
 
+TEST(LabelMaps, RepairsStayNearTheBoundary) {
+  // Maps in which some change that makes cells simple would move a wall to a sample whose six neighbours have
+  // its label, i.e. by more than half a voxel: in the first three such a change is the best of a cell, in the
+  // others it is necessary once all inside corners of an adjacent cell have the same label.
+  Totals totals;
+  for (const unsigned seed : {1000u, 1054u, 1072u, 10806u, 11222u, 15015u, 16992u})
+    expect_random_map(seed, totals);
+  print(totals);
+}
+
+TEST(LabelMaps, ANoisyBallStaysNearTheBoundary) {
+  // Three labels in a ball, and a tenth of the samples with random labels. Adjacent samples of one label get
+  // two different ones.
+  constexpr int kSize = 48, kHalf = kSize / 2;
+  std::mt19937 random(7);
+  const LabelMap map = made_map({kSize, kSize, kSize}, [&](int x, int y, int z) -> std::uint32_t {
+    const auto draw = static_cast<std::uint32_t>(random());
+    if (draw / 64 % 100 < 10) return draw % 4;
+    if ((Vector3d(x, y, z) - Vector3d::Constant(kHalf)).norm() > kHalf - 2) return 0;
+    return 3 * x + y > 2 * kSize ? 1 : z > kHalf ? 2 : 3;
+  });
+  const LabelMeshes made = meshes_of(map);
+  EXPECT_GT(made.fracture.repair.changed_samples, 100u);
+  EXPECT_LE(farthest(map, made), 0.5 + 2e-3);
+}
+
 TEST(Slow, TwoHundredRandomLabelMaps) {
   Totals totals;
   for (unsigned seed = 1000; seed < 1200; ++seed) expect_random_map(seed, totals);
