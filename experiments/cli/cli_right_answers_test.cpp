@@ -1,5 +1,9 @@
 // Small inputs that once went wrong, with their right answers (files in inputs/; volumes are closed forms).
 
+#include <cmath>
+#include <numbers>
+#include <sstream>
+
 #include "experiments/cli/process_for_tests.h"
 
 namespace hermesh::cli {
@@ -192,6 +196,35 @@ TEST_F(RightAnswersTest, AHeightFieldIsASolidIfThatIsRequested) {
   }
   expect_refusal(1, Words{"remesh", input("t41v_hill.obj"), "out.ply", "--fill-below=3"}, {"base"}, true);
   expect_refusal(2, Words{"remesh", input("t41v_hill.obj"), "out.ply", "--shell=-1"}, {"--shell"}, true);
+}
+
+TEST_F(RightAnswersTest, ShellsOfNarrowTubesKeepTheirThickness) {
+  // Tubes in several directions, whose shells nearly close them: gaps of less than a voxel.
+  constexpr int kSides = 24;
+  for (const double radius : {0.55, 0.6, 0.65})
+    for (const double angle : {0.3, 1.1, 2.3, 3.9, 5.2}) {
+      SCOPED_TRACE(std::to_string(radius) + ", " + std::to_string(angle));
+      std::ostringstream off;
+      off << "OFF\n" << 2 * kSides << " " << kSides << " 0\n";
+      for (int i = 0; i < 2 * kSides; ++i) {
+        const double a = i % kSides * 2.0 * std::numbers::pi / kSides, x = radius * std::cos(a),
+                     y = radius * std::sin(a), z = i < kSides ? 0.0 : 5.0;
+        // Turned about x, then about z, and moved.
+        const double v = std::cos(angle) * y - std::sin(angle) * z,
+                     w = std::sin(angle) * y + std::cos(angle) * z;
+        off << std::cos(2 * angle) * x - std::sin(2 * angle) * v + 0.37 * angle << " "
+            << std::sin(2 * angle) * x + std::cos(2 * angle) * v << " " << w << "\n";
+      }
+      for (int i = 0; i < kSides; ++i)
+        off << "4 " << i << " " << (i + 1) % kSides << " " << (i + 1) % kSides + kSides << " " << i + kSides
+            << "\n";
+      write("tube.off", off.str());
+      const Json result = json_of("remesh tube.off shell.ply --shell 1 --json")["result"];
+      const Json& errors = result["offset"];
+      const double voxel = result["voxel_size"];
+      for (const char* error : {"largest_below", "largest_above", "largest_from_offset"})
+        EXPECT_LT(errors[error].get<double>(), 0.85 * voxel) << error;
+    }
 }
 
 }  // namespace cli_right_answers_test

@@ -30,6 +30,10 @@ namespace {
 
 constexpr int kDefaultTile = 512;
 constexpr double kShellVoxels = 3.0;  ///< thickness of a shell in voxels, unless a size is given
+/// In shells of few voxels: the distance from their middle, in voxels, that vertices keep when they leave
+/// their cells, and the truncation, both found by trials with tubes and furniture.
+constexpr double kWithinShell = 1.25;
+constexpr const char* kShellTruncation = "0.3";
 
 struct ConvertArguments {
   Paths paths;
@@ -415,6 +419,24 @@ std::optional<Remeshed> remesh_by_tiles(const ConvertArguments& arguments, const
   return remeshed;
 }
 
+/// Places the vertices of a shell of few voxels nearer to the crossings of their cells, unless options say
+/// where: otherwise those next to narrow gaps, with planes of opposite walls, come to lie inside the wall.
+void place_within_shell(ExtractorArguments& extracting, double thickness_in_voxels) {
+  const double reach = std::max(0.0, 0.5 * thickness_in_voxels - kWithinShell);
+  if (reach >= 1.0) return;
+  for (const auto& [name, value] : {std::pair<std::string, std::string>("reach", text(reach)),
+                                    std::pair<std::string, std::string>("truncation", kShellTruncation)}) {
+    const auto is_given = [&](const std::string& option) {
+      return option.starts_with(name + "=") || option.starts_with("placement=");
+    };
+    const auto is_known = [&](const OptionSpec& option) { return option.name == name; };
+    if (std::ranges::none_of(extracting.options, is_given) &&
+        std::ranges::any_of(extracting.chosen.extractor.options, is_known))
+      extracting.options.push_back(name + "=" + value);
+  }
+  extracting.choose();
+}
+
 int run_remesh(ConvertArguments& arguments, const CLI::App& command, Session& session) {
   VoxelizeArguments& voxelizing = arguments.voxelizing;
   const Paths& paths = arguments.paths;
@@ -444,6 +466,8 @@ int run_remesh(ConvertArguments& arguments, const CLI::App& command, Session& se
   }
   VoxelizeRecipe recipe = voxelizing.recipe(mesh, paths.in, arguments.isovalue);
   recipe.offset = offset;
+  if (offset && offset->kind == Offset::Kind::shell)
+    place_within_shell(arguments.extracting, offset->distance / voxel_size_of(recipe, mesh));
   std::optional<Remeshed> result =
       job ? remesh_by_tiles(arguments, mesh, recipe, *job, session) : about_file(paths.in, [&] {
         return std::optional(remesh(mesh, recipe, extract_recipe(arguments, field), session.context));
