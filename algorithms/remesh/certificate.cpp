@@ -133,7 +133,7 @@ class Cover {
     const double largest = line.cwiseAbs().maxCoeff();
     if (!(largest > 0.0)) return false;
     for (double& c : line) c = std::round(c / largest * kLargest);
-    // A corner this close to the line would make a sliver that is no smaller than the piece.
+    // A part whose corners are all closer to the line than this is empty but for rounding.
     constexpr double kOnLine = 8.0;
     Piece parts[2];
     bool has[2] = {};

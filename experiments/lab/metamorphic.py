@@ -1,9 +1,9 @@
 """Metamorphic relations: the measurement `trial_relations`.
 
-A solid is changed in a way whose effect on the result is known without knowing the result: it is scaled by a
-power of two, moved by whole voxels, turned by a symmetry of the cube, and so on. Where the same result must
-come out to the last bit, or the same mesh but for rounding, all else is a violation; elsewhere the distance
-between the two meshes is bounded. Distances and volumes are those of `hermesh validate`.
+A solid is changed in a way whose effect on the result is known although the result is not: it is scaled by a
+power of two, moved by whole voxels, turned by a symmetry of the cube, and so on. Some changes must give
+the same result to the last bit; for the others the distance between the two meshes has an upper bound.
+Distances and volumes are those of `hermesh validate`.
 """
 
 import concurrent.futures
@@ -178,8 +178,8 @@ def finer(bench, mesh, words, random):
     return apart[1] <= apart[0], max(0.0, apart[1] - apart[0])
 
 
-# Relation: the function, and the largest distance in voxels that is no violation, by what is stated of a
-# method. Two meshes within a tenth of a voxel of the same uniform mesh are at most a fifth apart. A turned
+# By relation: its function, and the largest distance that is allowed for each kind of method, in voxels
+# (otherwise 0). Two meshes within a tenth of a voxel of the same uniform mesh are at most a fifth apart. A turned
 # cell may be triangulated otherwise: by a table up to its diagonal apart, in dual contouring where quads are
 # not plane.
 _EXACT, _ANY = {"uniform": 1e-3, "tables": 1e-3}, {"tolerance": 0.2, "others": 0.01, "free": 1.0}
@@ -242,7 +242,7 @@ def pieces(bench, mesh, words, random):
 
 
 def bounds(bench, mesh, words, random):
-    """A smaller error holds, and needs no fewer triangles, but for one in twenty."""
+    """Each error bounds the distance; a smaller one needs at least 95 % as many triangles as the last."""
     source, last = bench.write("solid.off", *mesh), 0
     for error in (4 * VOXEL, 2 * VOXEL, VOXEL):
         bench.run("remesh", source, "bounded.ply", "--error", repr(error), "--quiet")
@@ -329,6 +329,6 @@ MEASUREMENT = {
         "cases": "solids, each changed once",
         "same": "of these, those with the same result, to the last bit",
         "worst, worst, voxels": "largest distance between the results, or error of a volume per area",
-        "bound, bound, voxels": "largest value that is no violation",
+        "bound, bound, voxels": "largest value that is allowed",
         "failed": "cases in which a command fails", "violations": "cases beyond the bound, or failed",
         "first_mistake, first violation": "solid, and its value"})}

@@ -3,20 +3,22 @@
 
     reference/peers/label_maps.py BUILD OUT [--sizes 128,256] [--repetitions 3]
 
-The maps have 30 labels: Voronoi cells of random seeds in a ball, and six balls of five nested labels each. Writes
-OUT/rows.json and OUT/table.md with one row for each map and method:
-- CPU seconds of one thread, the least of the repetitions: of VTK's filters, from samples to meshes in memory,
-  and of the process `hermesh extract --label 1`, which meshes all labels, but also reads the map and writes a mesh;
-- triangles, defects and intersecting pairs, summed over the meshes of the labels, and the number of labels whose
-  mesh is watertight, all by `hermesh validate`;
+The maps have 30 labels: Voronoi cells of random seeds in a ball, and six balls of five nested labels each.
+Writes OUT/rows.json and OUT/table.md with one row for each map and method:
+- CPU seconds of one thread, the least of the repetitions: of VTK's filters, from samples to meshes in
+  memory, and of the process `hermesh extract --label 1`, which meshes all labels, but also reads the map
+  and writes a mesh;
+- triangles, defects and intersecting pairs, summed over the meshes of the labels, and the number of labels
+  whose mesh is watertight, all by `hermesh validate`;
 - largest difference of a label's volume from that of its voxels, percent;
 - largest distance of a vertex from the boundary between voxels of different labels, in voxels;
 - smallest angle of a triangle, degrees.
 
 Smoothing has the parameters of VTK's example Medical/GenerateModelsFromLabels: 15 iterations of
-vtkWindowedSincPolyDataFilter with a pass band of 0.001 and normalized coordinates, without smoothing of boundaries
-and feature edges. As there, all labels are smoothed together: discrete marching cubes shares the vertices of the
-walls between labels, discrete flying edges does not. Meshes are flipped if their volume is negative.
+vtkWindowedSincPolyDataFilter with a pass band of 0.001 and normalized coordinates, without smoothing of
+boundaries and feature edges. As there, all labels are smoothed together: discrete marching cubes shares the
+vertices of the walls between labels, discrete flying edges does not. Meshes are flipped if their volume is
+negative.
 """
 import argparse
 import datetime
@@ -104,8 +106,8 @@ def vtk_meshes(labels, kind, repetitions):
 def hermesh_meshes(hermesh, labels, folder, repetitions):
     """Returns the same for hermesh."""
     (folder / "map.raw").write_bytes(labels.tobytes())
-    run(hermesh, "import", folder / "map.raw", folder / "map.vdb", "--labels", "--type", "uint8", "--spacing", "1,1,1",
-        "--dims", ",".join(map(str, labels.shape[::-1])))
+    run(hermesh, "import", folder / "map.raw", folder / "map.vdb", "--labels", "--type", "uint8",
+        "--spacing", "1,1,1", "--dims", ",".join(map(str, labels.shape[::-1])))
     seconds = []
     extract = [hermesh, "extract", folder / "map.vdb", folder / "out.obj", "--threads", "1", "--json"]
     for _ in range(repetitions):
@@ -162,7 +164,8 @@ def run(*command):
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(description=__doc__,
+                                     formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("build", type=pathlib.Path)
     parser.add_argument("out", type=pathlib.Path)
     parser.add_argument("--sizes", default="128,256")
