@@ -1,6 +1,8 @@
 #include "experiments/cli/conversions.h"
 
 #include <algorithm>
+#include <charconv>
+#include <cmath>
 
 #include "algorithms/core/quad_diagonals.h"
 #include "algorithms/core/run_context.h"
@@ -176,6 +178,30 @@ MadeSolid make_solid(const PolygonMesh& mesh, const std::string& name, const Vox
   print_voxelized(session, name, mesh, made, arguments.chosen.voxelizer.name);
   report_thin_parts(made.thin, session);
   return made;
+}
+
+double length_in_world_units(const std::string& option, const std::string& text, double metres,
+                             double diagonal) {
+  double value = 0.0;
+  const auto [end, failure] = std::from_chars(text.data(), text.data() + text.size(), value);
+  const std::string unit(end, text.data() + text.size());
+  if (failure != std::errc() || !std::isfinite(value))
+    throw UsageError(option + " must be a number such as 0.05, 0.1% or 0.05mm, not '" + text + "'");
+  if (unit.empty()) return value;
+  if (unit == "%") return value / 100.0 * diagonal;
+  const std::optional<double> length = metres_in(unit);
+  if (!length) throw UsageError(option + " '" + text + "' has an unknown unit; see --units");
+  if (!(metres > 0.0))
+    throw UsageError(
+        option + " '" + text +
+        "' has a unit, but the mesh file states none; pass --units with that of the coordinates");
+  return value * (*length / metres);
+}
+
+double positive_length(const std::string& option, const std::string& text, double metres, double diagonal) {
+  const double length = length_in_world_units(option, text, metres, diagonal);
+  if (!(length > 0.0)) throw UsageError(option + " must be greater than 0, not '" + text + "'");
+  return length;
 }
 
 void print_voxelized(Session& session, const std::string& file, const PolygonMesh& mesh,

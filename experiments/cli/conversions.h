@@ -67,6 +67,16 @@ PolygonMesh polygons_of(MeshFile&& file, const std::string& path, Session& sessi
 MadeSolid make_solid(const PolygonMesh& mesh, const std::string& name, const VoxelizeArguments& arguments,
                      Session& session);
 
+/// Returns the length that an option gives in world units.
+/// @param text a number, with % or a unit behind it
+/// @param metres length of the world unit; 0 if it is unknown
+/// @param diagonal of the bounding box of the polygons, world units
+/// @throws UsageError
+double length_in_world_units(const std::string& option, const std::string& text, double metres,
+                             double diagonal);
+/// As length_in_world_units(), for lengths greater than 0.
+double positive_length(const std::string& option, const std::string& text, double metres, double diagonal);
+
 void print_voxelized(Session& session, const std::string& file, const PolygonMesh& mesh,
                      const VoxelizationFacts& facts, const std::string& voxelizer);
 void print_extracted(Session& session, const PolygonMesh& mesh, const std::string& extractor, double seconds);

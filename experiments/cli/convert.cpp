@@ -1,7 +1,6 @@
 // hermesh extract and remesh: a volume to a mesh; polygons to a level set and back to a mesh, at a voxel
 // size, within an error bound or within a budget of triangles.
 #include <algorithm>
-#include <charconv>
 #include <cmath>
 #include <memory>
 #include <sstream>
@@ -13,12 +12,10 @@
 #include "algorithms/extraction/volume_attributes.h"
 #include "algorithms/io/mesh_file.h"
 #include "algorithms/io/vdb_file.h"
-#include "algorithms/io/written_precision.h"
 #include "algorithms/remesh/auto_voxel.h"
-#include "algorithms/remesh/bounded_remesh.h"
-#include "algorithms/remesh/certificate.h"
 #include "algorithms/remesh/height_field.h"
 #include "algorithms/remesh/tiled_remesh.h"
+#include "experiments/cli/bounded.h"
 #include "experiments/cli/cli11.h"
 #include "experiments/cli/conversions.h"
 #include "experiments/cli/labels.h"
@@ -48,16 +45,9 @@ struct ConvertArguments {
   // Where an adaptive extractor keeps its bound; empty: not given.
   std::string mask, frustum, outside, tolerance_grid;
   std::optional<int> frustum_resolution;
-  // The bound of a mesh.
-  std::string error;                      ///< a number, with % or a unit behind it; empty: not given
-  std::optional<std::int64_t> triangles;  ///< budget
-  bool over_holes = false, except_thin = false;
-  std::optional<double> most_points;
-  bool through_volume = false;
-  double smallest_voxel = 0.0;  ///< world units; 0: not given
-  std::string certificate;      ///< file; empty: none
-  int tiles = 0;                ///< side of the tiles in voxels; 0: not given
-  std::string tile;             ///< "I/N", the job; empty: not given
+  BoundArguments bound;
+  int tiles = 0;     ///< side of the tiles in voxels; 0: not given
+  std::string tile;  ///< "I/N", the job; empty: not given
   // Solids other than that of the polygons: lengths, with % or a unit behind them; empty: not given.
   std::string shell, offset, fill_below;
 };
@@ -206,38 +196,6 @@ int run_extract(ConvertArguments& arguments, Session& session) {
     print_summary(session, line);
   }
   return save(arguments, mesh, {}, session);
-}
-
-// ---- Lengths.
-
-/// Returns the length that an option gives in world units.
-/// @param text a number, with % or a unit behind it
-/// @param metres length of the world unit; 0 if it is unknown
-/// @param diagonal of the bounding box of the polygons, world units
-/// @throws UsageError
-double length_in_world_units(const std::string& option, const std::string& text, double metres,
-                             double diagonal) {
-  double value = 0.0;
-  const auto [end, failure] = std::from_chars(text.data(), text.data() + text.size(), value);
-  const std::string unit(end, text.data() + text.size());
-  if (failure != std::errc() || !std::isfinite(value))
-    throw UsageError(option + " must be a number such as 0.05, 0.1% or 0.05mm, not '" + text + "'");
-  if (unit.empty()) return value;
-  if (unit == "%") return value / 100.0 * diagonal;
-  const std::optional<double> length = metres_in(unit);
-  if (!length) throw UsageError(option + " '" + text + "' has an unknown unit; see --units");
-  if (!(metres > 0.0))
-    throw UsageError(
-        option + " '" + text +
-        "' has a unit, but the mesh file states none; pass --units with that of the coordinates");
-  return value * (*length / metres);
-}
-
-/// As length_in_world_units(), for lengths greater than 0.
-double positive_length(const std::string& option, const std::string& text, double metres, double diagonal) {
-  const double length = length_in_world_units(option, text, metres, diagonal);
-  if (!(length > 0.0)) throw UsageError(option + " must be greater than 0, not '" + text + "'");
-  return length;
 }
 
 // ---- Remeshing at a voxel size.
@@ -496,132 +454,19 @@ int run_remesh(ConvertArguments& arguments, const CLI::App& command, Session& se
 
 // ---- Remeshing within a bound.
 
-SignRule sign_rule(const VoxelizeArguments& voxelizing) {
-  const std::string rule = voxelizing.signs.value_or("winding-number");
-  if (rule == "winding-number") return SignRule::winding_number;
-  if (rule == "flood-fill") return SignRule::flood_fill;
-  if (rule == "auto") return SignRule::automatic;
-  throw UsageError(
-      "a bound needs an inside: --signs must be winding-number (the default with --error and --triangles), "
-      "flood-fill or auto, not '" +
-      rule + "'");
-}
-
-/// Adds the balls outside of which the bound holds to the JSON document.
-void report_exceptions(const BoundedMesh& bounded, Session& session) {
-  Json balls = Json::array();
-  for (const UnmetPlace& ball : bounded.excepted)
-    balls.push_back({{"position", {ball.place.x(), ball.place.y(), ball.place.z()}},
-                     {"radius", ball.radius},
-                     {"distance", ball.distance},
-                     {"area", ball.area},
-                     {"reason", ball.why == Unmet::hole ? "hole" : "thin"}});
-  made(session, "exceptions", balls);
-  made(session, "excepted_area", bounded.excepted_area());
-}
-
-/// Returns true if validation/check_certificate.py reads a file: .off, .obj, .ply and .stl.
-bool can_be_checked(const std::string& path) { return is_mesh_path(path) && !states_unit(path); }
-
-/// @throws UsageError if a certificate cannot be about the files.
-void check_certificate_usage(const ConvertArguments& arguments, const Session& session) {
-  const Paths& paths = arguments.paths;
-  if (!can_be_checked(paths.in) || !can_be_checked(paths.out))
-    throw UsageError(
-        "a certificate is about two files, .off, .obj, .ply or .stl, but the command converts '" + paths.in +
-        "' to '" + paths.out + "'");
-  if (session.scale != 1.0 || !arguments.fill_below.empty())
-    throw UsageError("a certificate is about the input file, which --scale and --fill-below change");
-}
-
-/// Writes the certificate of a bounded mesh and reports what it does not cover.
-void certify(const ConvertArguments& arguments, const BoundedMesh& bounded, Session& session) {
-  const std::size_t notes = session.context.notes.size();
-  const MeshFile input = read_mesh_file(arguments.paths.in, session.context, {.triangle_numbers = true});
-  session.context.notes.resize(notes);  // they are those of the first time
-  const CertificateReport report =
-      write_certificate(arguments.certificate, input, bounded.mesh, bounded.error, session.context);
-  made(session, "certificate",
-       {{"file", arguments.certificate},
-        {"pieces", report.pieces},
-        {"uncovered_input", report.uncovered_input},
-        {"uncovered_output", report.uncovered_output}});
-  if (report.uncovered_input + report.uncovered_output > 0.0)
-    session.context.note("the certificate does not cover polygons of area " + text(report.uncovered_input) +
-                         ", such as those inside the solid, and an area of " + text(report.uncovered_output) +
-                         " of the mesh; its check needs --uncovered");
-}
-
 int run_bounded(const ConvertArguments& arguments, const CLI::App& command, Session& session) {
   refuse_idle(command,
               {"--tiles", "--tile", "--extractor", "-o", "--voxelizer", "--voxelizer-option",
                "--exterior-band", "--interior-band", "--isovalue", "--max-loss", "--mask", "--frustum",
                "--frustum-resolution", "--outside", "--tolerance-grid", "--shell", "--offset"},
               "with --error and --triangles the method is chosen for the bound");
-  const auto error = [&](double diagonal) {
-    return arguments.error.empty() ? 0.0
-                                   : positive_length("--error", arguments.error, session.metres, diagonal);
-  };
-  // Before the file is read, any unit is accepted.
-  if (!arguments.error.empty()) positive_length("--error", arguments.error, 1.0, 1.0);
-  const Paths& paths = arguments.paths;
-  BoundedRemeshOptions options{
-      .signs = sign_rule(arguments.voxelizing),
-      .over_holes = arguments.over_holes,
-      .most_points = arguments.most_points.value_or(arguments.triangles ? 4e5 : 3e7),
-      .smallest_voxel = arguments.smallest_voxel,
-      .written_in_single = is_written_in_single(paths.out),
-      .thin = arguments.voxelizing.thin.value_or("keep") == "keep" ? ThinRule::keep : ThinRule::drop,
-      .through_volume = arguments.through_volume,
-      .except_thin = arguments.except_thin};
-  check_mesh_output(paths.out);
-  if (!arguments.certificate.empty()) check_certificate_usage(arguments, session);
+  if (!arguments.bound.certificate.empty())
+    refuse_idle(command, {"--scale", "--fill-below"}, "a certificate is about the input file as it is");
+  check_bound_usage(arguments.bound, arguments.voxelizing, arguments.paths);
+  check_mesh_output(arguments.paths.out);
   const PolygonMesh mesh = read_input(arguments, session);
-  const double diagonal = bounds(mesh).size().norm();
-  const double bound_asked = error(diagonal);
-  options.error = arguments.triangles ? 0.0 : bound_asked;
-  Stopwatch watch;
-  BoundedMesh made = about_file(paths.in, [&] {
-    if (!(diagonal > 0.0)) throw Error("the polygons have no extent");
-    return arguments.triangles
-               ? remesh_to_budget(mesh, std::size_t(*arguments.triangles), options, session.context)
-               : bounded_remesh(mesh, options, session.context);
-  });
-  session.context.check();
-  if (!made.unmet.empty())
-    throw Error("'" + paths.in + "': " +
-                (arguments.triangles
-                     ? "no mesh of " + std::to_string(*arguments.triangles) + " triangles was found: "
-                     : "") +
-                explanation(made) + "; nothing was written");
-  if (bound_asked > 0.0 && std::max(made.to_surface, made.from_surface) > bound_asked)
-    throw Error("'" + paths.in + "': the smallest certified error found for " +
-                std::to_string(*arguments.triangles) + " triangles is " +
-                length_text(session, std::max(made.to_surface, made.from_surface)) + ", above --error " +
-                length_text(session, bound_asked) + "; allow more triangles or a larger error");
-  session.context.figure("error_asked", made.error);
-  session.context.figure("certified_to_polygons", made.to_surface);
-  session.context.figure("certified_from_polygons", made.from_surface);
-  session.context.figure("voxel_size", made.voxel_size);
-  session.context.figure("triangles", double(made.mesh.triangle_count()));
-  session.context.figure("rounds", made.rounds);
-  if (made.free_area > 0.0) session.context.figure("area_that_bounds_nothing", made.free_area);
-  if (made.hole_area > 0.0) session.context.figure("hole_area", made.hole_area);
-  for (const std::string& note : notes(made)) session.context.note(note);
-  if (made.thin) session.context.note(thin_note(*made.thin, made.voxel_size));
-  report_thin_parts(made.thin, session);
-  report_exceptions(made, session);
-  print_extracted(
-      session, made.mesh,
-      made.voxel_size > 0.0 ? "voxels of " + length_text(session, made.voxel_size) : "without a volume",
-      watch.seconds());
-  const double bound = std::max(made.to_surface, made.from_surface);
-  print_summary(session, "certified: the mesh is within " + length_text(session, made.to_surface) +
-                             " of the polygons' solid, and the solid within " +
-                             length_text(session, made.from_surface) + " of the mesh (" +
-                             text(100.0 * bound / diagonal) + "% of the diagonal)" +
-                             (made.excepted.empty() ? "" : ", EXCEPT at the places of a note"));
-  if (!arguments.certificate.empty()) certify(arguments, made, session);
+  BoundedMesh made =
+      remesh_within_bound(arguments.bound, arguments.voxelizing, arguments.paths, mesh, session);
   return save(arguments, made.mesh, mesh, session);
 }
 
@@ -658,43 +503,6 @@ void add_extract_options(CLI::App& command, ConvertArguments& arguments, const s
   group->add_option("--tolerance-grid", arguments.tolerance_grid,
                     "A .vdb whose values, none negative, scale the extractor's bound; the background applies "
                     "beyond its data");
-}
-
-void add_bound_options(CLI::App& command, CLI::App& size, ConvertArguments& arguments) {
-  size.add_option("--error", arguments.error,
-                  "In place of a size the certified bound of the two-sided distance between the mesh and the "
-                  "polygons' solid: in world units, with % of the bounding box's diagonal, or with a unit if "
-                  "that of the coordinates is known (0.05mm)");
-  size.add_option("--triangles", arguments.triangles,
-                  "In place of a size the maximum number of triangles; the mesh has the smallest certified "
-                  "error found. With --error the command fails if that is larger")
-      ->transform(whole_number(4, std::int64_t(1) << 31));
-  CLI::Option_group* group = command.add_option_group("With --error or --triangles");
-  group->add_flag("--over-holes", arguments.over_holes,
-                  "Allow the mesh to close holes; the bound there is to the surface where the winding number "
-                  "is 1/2");
-  group->add_flag("--except-thin", arguments.except_thin,
-                  "Where the bound cannot be reached (holes, walls and gaps too thin for the voxels), let it "
-                  "hold elsewhere, and list these places in a note and in --json as balls (default: the "
-                  "command fails)");
-  group->add_flag("--through-volume", arguments.through_volume,
-                  "Make a volume also if the polygons are a closed, manifold mesh free of self-intersection "
-                  "(default: such a mesh is simplified itself, which preserves its topology and is faster)");
-  group
-      ->add_option("--limit-points", arguments.most_points,
-                   "Maximum number of vertices of the finest mesh (default: 3e7, some 9 GiB, with --error; "
-                   "4e5 per attempt with --triangles); the command fails if the bound needs more")
-      ->check(CLI::Range(1e3, 1e9));
-  group
-      ->add_option(
-          "--smallest-voxel", arguments.smallest_voxel,
-          "Smallest voxel size to try, in world units (default: an eighth of the error); the command "
-          "fails if a wall or gap is too thin for it")
-      ->check(CLI::PositiveNumber);
-  group->add_option(
-      "--certificate", arguments.certificate,
-      "Also write a proof of the bound to this file, which check_certificate.py verifies in exact "
-      "arithmetic, without hermesh");
 }
 
 void add_solid_options(CLI::App& command, ConvertArguments& arguments) {
@@ -765,15 +573,16 @@ void add_conversions(CLI::App& app, Session& session) {
   command->add_option("--max-loss", arguments->max_loss,
                       "Exit with 3 if more of the visible surface is lost, such as 1% (default: no limit, or "
                       "1% with --thin drop)");
-  add_bound_options(*command, *size, *arguments);
+  add_bound_options(*command, *size, arguments->bound);
   add_attributes_option(*command, arguments->attributes);
   set_work(*command, session, [arguments, command, size, &session] {
-    const bool bounded_twice = arguments->triangles && !arguments->error.empty();
+    const BoundArguments& bound = arguments->bound;
+    const bool bounded_twice = bound.triangles && !bound.error.empty();
     if (size->count_all() > 1 + std::size_t(bounded_twice))
       throw UsageError(
           "at most one of --voxel-size, --resolution, --error and --triangles determines the size, or "
           "--error with --triangles");
-    if (arguments->triangles || !arguments->error.empty()) return run_bounded(*arguments, *command, session);
+    if (bound.triangles || !bound.error.empty()) return run_bounded(*arguments, *command, session);
     refuse_idle(*command,
                 {"--over-holes", "--except-thin", "--through-volume", "--limit-points", "--smallest-voxel",
                  "--certificate"},
