@@ -28,8 +28,12 @@ constexpr std::size_t kMostPieces = 1'000'000;  // of a triangle
 /// Largest coefficient of a line.
 constexpr double kLargest = double(1 << 30);
 
-using Barycentric = Eigen::Vector3d;
-using Piece = std::vector<Barycentric>;
+/// A corner of a piece.
+struct Corner {
+  Eigen::Vector3d weights;  ///< barycentric coordinates in the divided triangle
+  Eigen::Vector3d place;
+};
+using Piece = std::vector<Corner>;
 
 /// Returns the number with enough digits to read the same double.
 std::string exact(double value) {
@@ -47,12 +51,14 @@ class Cover {
   void add(const std::array<Eigen::Vector3d, 3>& triangle) {
     triangle_ = triangle;
     pieces_ = 0;
-    divide({Barycentric::UnitX(), Barycentric::UnitY(), Barycentric::UnitZ()}, last_);
+    divide({corner(Eigen::Vector3d::UnitX()), corner(Eigen::Vector3d::UnitY()),
+            corner(Eigen::Vector3d::UnitZ())},
+           last_);
   }
 
  private:
-  Eigen::Vector3d place(const Barycentric& b) const {
-    return b[0] * triangle_[0] + b[1] * triangle_[1] + b[2] * triangle_[2];
+  Corner corner(const Eigen::Vector3d& weights) const {
+    return {weights, weights[0] * triangle_[0] + weights[1] * triangle_[1] + weights[2] * triangle_[2]};
   }
 
   /// Adds the tree of a piece. `known` is a triangle that is likely near.
@@ -60,9 +66,9 @@ class Cover {
     if (pieces_++ % 256 == 0) context_.check();
     if (known != TriangleTree::kNone && assign(piece, known)) return;
     Eigen::Vector3d middle = Eigen::Vector3d::Zero();
-    for (const Barycentric& b : piece) middle += place(b) / double(piece.size());
+    for (const Corner& p : piece) middle += p.place / double(piece.size());
     double radius = 0.0;
-    for (const Barycentric& b : piece) radius = std::max(radius, (place(b) - middle).norm());
+    for (const Corner& p : piece) radius = std::max(radius, (p.place - middle).norm());
     const double search = limit_ + radius;
     const std::uint32_t nearest = tree_.nearest(middle, search * search).triangle;
     if (nearest != known && nearest != TriangleTree::kNone && assign(piece, nearest)) return;
@@ -75,8 +81,8 @@ class Cover {
   bool assign(const Piece& piece, std::uint32_t triangle) {
     const Eigen::Vector3d a = tree_.corner(triangle, 0), b = tree_.corner(triangle, 1),
                           c = tree_.corner(triangle, 2);
-    for (const Barycentric& corner : piece)
-      if (squared_distance(place(corner), a, b, c) > limit_ * limit_) return false;
+    for (const Corner& p : piece)
+      if (squared_distance(p.place, a, b, c) > limit_ * limit_) return false;
     const std::int64_t step =
         std::int64_t(triangle) - (last_ == TriangleTree::kNone ? 0 : std::int64_t(last_));
     proof_.numbers.push_back(std::int32_t((step >= 0 ? 2 * step : -2 * step - 1) + 2));
@@ -88,7 +94,7 @@ class Cover {
   void leave(const Piece& piece) {
     Eigen::Vector3d twice = Eigen::Vector3d::Zero();
     for (std::size_t i = 2; i < piece.size(); ++i)
-      twice += (place(piece[i - 1]) - place(piece[0])).cross(place(piece[i]) - place(piece[0]));
+      twice += (piece[i - 1].place - piece[0].place).cross(piece[i].place - piece[0].place);
     proof_.uncovered_area += 0.5 * twice.norm();
     proof_.numbers.push_back(0);
   }
@@ -100,15 +106,15 @@ class Cover {
                           c = tree_.corner(triangle, 2);
     double farthest = -1.0;
     Eigen::Vector3d from = Eigen::Vector3d::Zero(), to = from;
-    for (const Barycentric& corner : piece) {
-      const Eigen::Vector3d p = place(corner), q = closest_point(p, a, b, c).position;
-      if ((p - q).norm() <= farthest) continue;
-      farthest = (p - q).norm();
-      from = q, to = p;
+    for (const Corner& p : piece) {
+      const Eigen::Vector3d q = closest_point(p.place, a, b, c).position;
+      if ((p.place - q).norm() <= farthest) continue;
+      farthest = (p.place - q).norm();
+      from = q, to = p.place;
     }
     const Eigen::Vector3d way = (to - from).normalized();
     double least = farthest;
-    for (const Barycentric& corner : piece) least = std::min(least, way.dot(place(corner) - from));
+    for (const Corner& p : piece) least = std::min(least, way.dot(p.place - from));
     // A piece that is beyond the cut everywhere is divided at the limit.
     const double level = least < 0.9 * kCut * limit_ ? kCut * limit_ : 0.5 * (least + limit_);
     if (!(least < 0.98 * limit_ && level < farthest)) return false;
@@ -120,8 +126,7 @@ class Cover {
     Eigen::Vector3d longest = Eigen::Vector3d::Zero();
     for (std::size_t i = 0; i < piece.size(); ++i)
       for (std::size_t j = 0; j < i; ++j)
-        if (const Eigen::Vector3d d = place(piece[i]) - place(piece[j]); d.norm() > longest.norm())
-          longest = d;
+        if (const Eigen::Vector3d d = piece[i].place - piece[j].place; d.norm() > longest.norm()) longest = d;
     return split(piece, longest, middle, near);
   }
 
@@ -138,14 +143,14 @@ class Cover {
     Piece parts[2];
     bool has[2] = {};
     for (std::size_t i = 0; i < piece.size(); ++i) {
-      const Barycentric &p = piece[i], &q = piece[(i + 1) % piece.size()];
-      const double at = line.dot(p), next = line.dot(q);
+      const Corner &p = piece[i], &q = piece[(i + 1) % piece.size()];
+      const double at = line.dot(p.weights), next = line.dot(q.weights);
       if (at >= 0.0) parts[0].push_back(p);
       if (at <= 0.0) parts[1].push_back(p);
       has[0] = has[0] || at > kOnLine;
       has[1] = has[1] || at < -kOnLine;
       if ((at > 0.0 && next < 0.0) || (at < 0.0 && next > 0.0)) {
-        const Barycentric between = (at * q - next * p) / (at - next);
+        const Corner between = corner((at * q.weights - next * p.weights) / (at - next));
         parts[0].push_back(between);
         parts[1].push_back(between);
       }
