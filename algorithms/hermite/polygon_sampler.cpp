@@ -47,6 +47,11 @@ bool is_inside_out(const std::vector<IndexTriangle>& triangles) {
   return volume + 0.5 * sum.cwiseAbs().dot(box.sizes()) < -kNoVolume * std::pow(area, 1.5);
 }
 
+/// An order of points and directions by their coordinates.
+bool before(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
+  return std::ranges::lexicographical_compare(a, b);
+}
+
 std::vector<IndexTriangle> to_index_space(const PolygonMesh& mesh, const IndexToWorld& placement) {
   const Eigen::Matrix3d inverse = placement.linear.inverse();
   const Eigen::Vector3d shift = mesh.origin - placement.origin - placement.offset;
@@ -56,6 +61,8 @@ std::vector<IndexTriangle> to_index_space(const PolygonMesh& mesh, const IndexTo
     IndexTriangle& t = result[i];
     // In double precision, relative to the base of the placement.
     for (int c = 0; c < 3; ++c) t.corner[c] = inverse * (mesh.points[triangles[i][c]].cast<double>() + shift);
+    // From the first corner by coordinates, so that rounding does not depend on the order in the file.
+    std::ranges::rotate(t.corner, std::ranges::min_element(t.corner, before));
     t.normal = (t.corner[1] - t.corner[0]).cross(t.corner[2] - t.corner[0]);
   }
   return result;
@@ -144,8 +151,7 @@ TriangleBins bin_triangles(const std::vector<IndexTriangle>& triangles, const Fl
           }
     }
   });
-  // Count, scan, fill, by chunks in order, so that each block lists its triangles in ascending order: equal
-  // hits go to the lowest number.
+  // Count, scan, fill, by chunks in order, so that each block lists its triangles in ascending order.
   TriangleBins bins;
   bins.first.assign(blocks.size() + 1, 0);
   for (const auto& pairs : found)
@@ -267,7 +273,8 @@ class LeafHits {
     for (const std::uint32_t t : nearby) {
       if (!(outwards * triangles[t].normal[axis] > 0)) continue;
       const double squared = (nearest_point(triangles[t], crossing) - crossing).squaredNorm();
-      if (squared < least) least = squared, nearest = &triangles[t];
+      if (squared < least || (squared == least && nearest && before(triangles[t].normal, nearest->normal)))
+        least = squared, nearest = &triangles[t];
     }
     if (!nearest) return false;
     const double met = nearest->normal.dot(nearest->corner[0] - start) / nearest->normal[axis];
@@ -298,8 +305,10 @@ class LeafHits {
       const bool first = best.hits == 0;
       if (first || std::abs(best.offset - offset) > kTolerance) ++best.hits;
       // A hit in the direction of the signs beats one against it; among equals the one nearer to the level
-      // set's own crossing wins, and of those the first.
-      const bool better = consistent != best.consistent ? consistent : away < best.away;
+      // set's own crossing wins, and of those the first by its normal, whatever the triangles' order.
+      const bool better = consistent != best.consistent ? consistent
+                          : away != best.away           ? away < best.away
+                                                        : before(normal, best.normal);
       if (first || better)
         best = {offset, away, normal, consistent, place == EdgePlace::of_samples, best.hits};
     }

@@ -6,6 +6,7 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
+#include <random>
 
 #include "algorithms/core/level_set_grid.h"
 #include "algorithms/hermite/test_normals.h"
@@ -106,6 +107,27 @@ TEST(PolygonSampler, HitsAreExactWhicheverWayThePolygonsAreWound) {
       const Vector3d face = (at - centre).cwiseSign() / std::sqrt(3.0);
       ASSERT_GT(normal.dot(face), 1.0 - 1e-5);
     });
+  }
+}
+
+TEST(PolygonSampler, TheOrderOfTrianglesAndOfTheirCornersDoesNotCount) {
+  // Lattice lines hit the edges and corners of this octahedron, so several triangles have the same hits.
+  const Vector3d centre = Vector3d::Zero();
+  PolygonMesh mesh = octahedron(12.0, centre, false);
+  RunContext context;
+  const FloatHermite expected = sample_polygons(octahedron_level_set(12.0, centre), 0.0, mesh, context);
+  ASSERT_FALSE(expected.crossings.empty());
+  std::mt19937 random(3);
+  for (int round = 0; round < 10; ++round) {
+    std::ranges::shuffle(mesh.triangles, random);
+    for (Triangle& triangle : mesh.triangles)
+      std::ranges::rotate(triangle, triangle.begin() + static_cast<int>(random() % 3));
+    const FloatHermite found = sample_polygons(octahedron_level_set(12.0, centre), 0.0, mesh, context);
+    ASSERT_EQ(found.crossings.size(), expected.crossings.size());
+    for (std::size_t i = 0; i < found.crossings.size(); ++i) {
+      ASSERT_EQ(found.crossings[i].offset, expected.crossings[i].offset);
+      ASSERT_EQ(found.crossings[i].normal, expected.crossings[i].normal);
+    }
   }
 }
 

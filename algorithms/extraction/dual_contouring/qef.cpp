@@ -4,6 +4,13 @@
 #include <algorithm>
 
 namespace hermesh {
+namespace {
+
+/// Share of the squared distance that decides between places of equal error: far above the rounding of
+/// crossings in single precision, and 1e-5 voxel off the planes at most.
+constexpr double kPreferNear = 1e-10;
+
+}  // namespace
 
 void Qef::add_plane(const Eigen::Vector3d& point, const Eigen::Vector3d& unit_normal) {
   const Eigen::Vector3d local = point - anchor_;
@@ -99,7 +106,12 @@ Eigen::Vector3d Qef::minimiser_within(const Eigen::Vector3d& lower, const Eigen:
   // Free coordinates start at the mass point, moved into the box, which is the result if no choice is better.
   const Eigen::Vector3d mass = (sum_ / planes_).cwiseMax(low).cwiseMin(high);
   Eigen::Vector3d best = mass;
-  double best_error = error(anchor_ + mass);
+  // A line of minima leaves the box by two faces, with the same error but for rounding: the nearer one
+  // counts.
+  const auto cost = [&](const Eigen::Vector3d& x) {
+    return error(anchor_ + x) + kPreferNear * (x - mass).squaredNorm();
+  };
+  double best_cost = cost(mass);
   for (int choice = 1; choice < 27; ++choice) {
     const int held[3] = {choice % 3, choice / 3 % 3, choice / 9};  // 0 free, 1 at lower, 2 at upper
     Eigen::Vector3d x = mass;
@@ -127,8 +139,8 @@ Eigen::Vector3d Qef::minimiser_within(const Eigen::Vector3d& lower, const Eigen:
     }
     // A minimum outside of the box is skipped: the box's own then lies on one more side, in another choice.
     if ((x.array() < low.array()).any() || (x.array() > high.array()).any()) continue;
-    const double candidate = error(anchor_ + x);
-    if (candidate < best_error) best = x, best_error = candidate;
+    const double candidate = cost(x);
+    if (candidate < best_cost) best = x, best_cost = candidate;
   }
   return anchor_ + best;
 }

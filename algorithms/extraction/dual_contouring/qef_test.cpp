@@ -63,6 +63,25 @@ TEST(Qef, WithinTheBoxNoSampledPointIsBetter) {
   }
 }
 
+TEST(Qef, ALineOfMinimaLeavesTheBoxWhereItIsNearest) {
+  // Two planes meet in the line (0.9 + t, t, 0.5), which crosses the box from (0.9, 0) to (1, 0.1). The point
+  // nearest to the mass point lies beyond the box. Both ends have the same error, so rounding must not
+  // choose.
+  std::mt19937 random(2);
+  std::uniform_real_distribution<double> rounding(-1e-7, 1e-7);
+  for (int round = 0; round < 100; ++round) {
+    Qef qef(Vector3d::Constant(0.5));
+    const auto add = [&](const Vector3d& point, const Vector3d& normal) {
+      qef.add_plane(point + Vector3d(rounding(random), rounding(random), rounding(random)), normal);
+    };
+    for (const Vector3d& point : {Vector3d(0.6, 1, 0.5), Vector3d(0.7, 1, 0.5), Vector3d(0.6, 0.9, 0.5)})
+      add(point, Vector3d::UnitZ());
+    add(Vector3d(0.95, 0.05, 0.3), Vector3d(1, -1, 0).normalized());
+    const Vector3d best = qef.minimiser_within(Vector3d::Zero(), Vector3d::Ones(), 0.1);
+    ASSERT_LT((best - Vector3d(1, 0.1, 0.5)).norm(), 1e-5) << best.transpose();
+  }
+}
+
 /// Planes of the bowl z = k (x² + y²) / 2 at positions (x, y).
 Qef bowl(double k, std::initializer_list<std::array<double, 2>> places) {
   Qef qef(Vector3d::Zero());
