@@ -45,7 +45,11 @@ struct MeshFile {
 /// - OBJ: vn as "normal" and the first two numbers of vt as "uv" of corners; r g b behind the coordinates of
 /// a
 ///   point as "colour" of points; usemtl as "material" of polygons, with labels.
-/// OFF, STL, glTF and 3MF give none.
+/// - glTF: COLOR_0 as "colour" of points, from linear to screen values, TEXCOORD_0 as "uv" of corners, whose
+///   second number goes up, as in OBJ, and "material" of polygons, with labels. A point that the file repeats
+///   with another colour has the first one, with a note.
+/// - 3MF: groups of colours as "colour" of points, as above, and basematerials as "material" of polygons.
+/// OFF and STL give none.
 ///
 /// The pieces of a cut polygon keep the values of its corners and its own; a dropped polygon drops its
 /// values. Degenerate polygons and points that no polygon uses keep theirs; nothing is merged in these
@@ -92,8 +96,8 @@ PolygonMesh read_mesh(const std::filesystem::path& path, RunContext& context,
 /// sums origin + point are exact in double precision: always if the origin is 0, and as long as a point's
 /// last bit is at least 2^-52 of its distance from 0. PLY stores the attributes of points and of polygons,
 /// colours as bytes, and "uv" of corners; OBJ stores "colour" and "normal" of points, "uv" and the names of
-/// "material"; a note lists those that are left out. STL, glTF and 3MF cut quads into
-/// triangles.
+/// "material"; glTF stores all of these, and repeats points at seams; 3MF stores "colour", as bytes, or else
+/// "material". A note lists those that are left out. STL, glTF and 3MF cut quads into triangles.
 /// @param metres length in metres of the unit of the coordinates; 0 if it is unknown. A 3MF file states the
 ///   unit, or millimetres if it is unknown or none of the format's; a glTF file is in metres. Where the unit
 ///   differs, the placement of the part scales it, so that no coordinate is rounded.

@@ -216,37 +216,7 @@ void write_ply(Output& out, const MeshFile& mesh, const PlyAttributes& attribute
 // Text is read in double precision, so points are written as doubles: the few digits that identify a float
 // are another double.
 
-/// The attributes that OBJ stores; null where the mesh has none.
-struct ObjAttributes {
-  const MeshAttribute *colour = nullptr, *normal = nullptr, *uv = nullptr, *material = nullptr;
-};
-
-ObjAttributes obj_attributes(const MeshFile& mesh, const std::string& file, RunContext& context) {
-  ObjAttributes result;
-  std::string lost;
-  for (const MeshAttribute& attribute : mesh.attributes) {
-    const auto is = [&](const char* name, AttributeDomain domain, int components, std::size_t kind) {
-      return attribute.name == name && attribute.domain == domain && attribute.components == components &&
-             attribute.values.index() == kind;
-    };
-    if (is("colour", AttributeDomain::point, 3, 0))
-      result.colour = &attribute;
-    else if (is("normal", AttributeDomain::point, 3, 0))
-      result.normal = &attribute;
-    else if (is("uv", AttributeDomain::point, 2, 0) || is("uv", AttributeDomain::corner, 2, 0))
-      result.uv = &attribute;
-    else if (is("material", AttributeDomain::polygon, 1, 1) && !attribute.labels.empty())
-      result.material = &attribute;
-    else
-      lost += (lost.empty() ? "" : ", ") + attribute.name;
-  }
-  if (!lost.empty())
-    context.note(
-        joined(in_quotes(file), ": an OBJ cannot store these attributes, which were left out: ", lost));
-  return result;
-}
-
-void write_obj(Output& out, const MeshFile& mesh, const ObjAttributes& attributes) {
+void write_obj(Output& out, const MeshFile& mesh, const NamedAttributes& attributes) {
   if (mesh.origin) write_numbers(out, "# origin", *mesh.origin);
   const auto values = [](const MeshAttribute* attribute) -> const float* {
     return attribute ? std::get<0>(attribute->values).data() : nullptr;
@@ -298,14 +268,6 @@ void write_obj(Output& out, const MeshFile& mesh, const ObjAttributes& attribute
     }
     out.text("\n");
   });
-}
-
-/// Adds a note about the attributes of a mesh whose format stores none.
-void note_lost_attributes(const MeshFile& mesh, const std::string& file, RunContext& context) {
-  std::string lost;
-  for (const MeshAttribute& attribute : mesh.attributes) lost += (lost.empty() ? "" : ", ") + attribute.name;
-  if (!lost.empty())
-    context.note(joined(in_quotes(file), ": only PLY and OBJ store attributes; these were left out: ", lost));
 }
 
 void write_off(Output& out, const MeshFile& mesh) {
@@ -401,7 +363,6 @@ void write_mesh(const std::filesystem::path& path, const PolygonMesh& mesh, RunC
     if (!file.points[i].allFinite())
       throw Error(joined("cannot write ", in_quotes(name), ": point ", i, " is not finite"));
   if (named->format == Format::stl) note_losses_of_stl(name, file, context);
-  if (named->format != Format::ply && named->format != Format::obj) note_lost_attributes(file, name, context);
   // In this order, so that an Error closes the stream before it removes the file.
   AtomicFile temporary(path);
   Output out(temporary.path(), path, named->gzipped, context);
@@ -411,17 +372,20 @@ void write_mesh(const std::filesystem::path& path, const PolygonMesh& mesh, RunC
       write_ply(out, file, ply_attributes(file, name, context));
       break;
     case Format::obj:
-      write_obj(out, file, obj_attributes(file, name, context));
+      write_obj(out, file,
+                named_attributes(file.attributes, "colour normal uv material", "an OBJ", name, context));
       break;
     case Format::off:
+      named_attributes(file.attributes, "", "an OFF", name, context);
       write_off(out, file);
       break;
     case Format::stl:
+      named_attributes(file.attributes, "", "an STL", name, context);
       write_stl(out, file);
       break;
     case Format::glb:
     case Format::gltf:
-      write_gltf(sink, mesh, named->format == Format::glb, name, metres > 0.0 ? metres : 1.0);
+      write_gltf(sink, mesh, named->format == Format::glb, name, metres > 0.0 ? metres : 1.0, context);
       break;
     case Format::three_mf:
       write_three_mf(sink, mesh, metres, name, context);

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <functional>
+#include <map>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -32,18 +33,31 @@ bool begins_like_glb(std::string_view bytes);
 /// @throws Error for a damaged file, or one that requires an extension that changes its shape.
 void read_three_mf(std::string_view bytes, MeshBuilder& builder);
 
+/// The attributes of a mesh by their use; null where it has none.
+struct NamedAttributes {
+  const MeshAttribute *colour = nullptr, *normal = nullptr, *uv = nullptr, *material = nullptr;
+};
+
+/// Returns the attributes "colour" and "normal" of points, "uv" of points or corners, and "material" of
+/// polygons with labels, of those that `stored` lists, where "alpha" allows colours of four components. All
+/// others are listed in a note about a `format` such as "an OBJ".
+NamedAttributes named_attributes(const std::vector<MeshAttribute>& attributes, std::string_view stored,
+                                 const char* format, const std::string& file, RunContext& context);
+
 /// Writes a mesh as glTF 2.0 with its buffer inside, as .glb or as text. Quads become two triangles. The
 /// points are those of the mesh in single precision, and its origin is the translation of the node, so that
-/// nothing is rounded. @param metres length of the unit of the mesh: the scale of the node
+/// nothing is rounded. Points are repeated where texture coordinates have a seam; each material is a
+/// primitive.
+/// @param metres length of the unit of the mesh: the scale of the node
 /// @throws Error if the mesh is too large for a .glb file, whose lengths have 32 bits.
 void write_gltf(const ByteSink& out, const PolygonMesh& mesh, bool binary, const std::string& file,
-                double metres);
+                double metres, RunContext& context);
 
 /// Writes a mesh as 3MF. @param metres length of the unit of the mesh: the unit of the file if it is one of
 /// kThreeMfUnits, else the scale of the build's item in millimetres; 0: millimetres. Quads become two
 /// triangles; triangles with a corner twice, which the format forbids, are left out with a note. Numbers are
-/// the shortest text of the double; the origin of the mesh is the translation of the build's item. The packed
-/// file is built in memory.
+/// the shortest text of the double; the origin of the mesh is the translation of the build's item. Colours of
+/// points are stored in bytes, or else the names of materials. The packed file is built in memory.
 void write_three_mf(const ByteSink& out, const PolygonMesh& mesh, double metres, const std::string& file,
                     RunContext& context);
 
@@ -73,11 +87,20 @@ struct ScenePart {
   std::vector<Eigen::Vector3d> points;
   static constexpr std::uint32_t kLeftOut = 0xffffffffu;  ///< corner of triangles that are not placed
   std::vector<Triangle> triangles;                        ///< every other corner is a point of the part
+  // Attributes, empty if the part has none. NaN, or a material of -1, is none.
+  std::vector<std::array<float, 4>> colours;              ///< of points, with alpha, for screens (sRGB)
+  std::vector<std::array<float, 2>> texture_coordinates;  ///< of corners; the second one goes up
+  std::vector<std::int32_t> materials;                    ///< of triangles
 
   /// Returns the bytes that one more copy of the part takes in a mesh.
   double cost() const {
-    return double(points.size() * sizeof(Eigen::Vector3d) + triangles.size() * sizeof(Triangle));
+    return double(points.size() * sizeof(Eigen::Vector3d) + triangles.size() * sizeof(Triangle) +
+                  colours.size() * sizeof(colours[0]) + materials.size() * sizeof(materials[0]) +
+                  texture_coordinates.size() * sizeof(texture_coordinates[0]));
   }
+  /// Sets the colour of a point, which must be among the first of its number to have one, or the newest.
+  /// Returns false if it has another colour already, which then stays.
+  bool set_colour(std::uint32_t point, const std::array<float, 4>& colour);
 };
 
 /// Adds parts to the mesh of a builder and sums up their memory, so that a small file which repeats its parts
@@ -93,13 +116,25 @@ class PartPlacer {
   /// that they still face outwards; a flattening one leaves the part out. @throws Error if the placement is
   /// not finite.
   void place(const ScenePart& part, const Placement& placement);
+  /// Makes colours have four components; otherwise alpha is 1 everywhere, and left out.
+  void keep_alpha() { colour_components_ = 4; }
+  /// Sets the names of the materials, by the numbers in ScenePart::materials.
+  void name_materials(const std::vector<std::string>& names);
+  /// Notes what was left out: an attribute of a part, for a reason, of which the first counts.
+  void leave_out_attribute(const std::string& name, const std::string& reason);
   /// Notes the number of parts that were left out.
   void note_left_out();
 
  private:
+  void place_attributes(const ScenePart& part, bool mirrored);
+  /// Returns the number of a column of attributes, which is added when first asked for.
+  std::size_t column(const std::string& name);
+
   MeshBuilder& builder_;
   double spent_ = 0.0;
   std::size_t flattened_ = 0;
+  int colour_components_ = 3;
+  std::map<std::string, std::size_t> columns_;
 };
 
 }  // namespace hermesh::mesh_formats

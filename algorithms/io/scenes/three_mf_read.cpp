@@ -1,211 +1,16 @@
 // 3MF (3MF Consortium, core specification 1.3, production extension 1.1): XML in a ZIP archive, by expat and
 // minizip.
-#include <expat.h>
-#include <malloc.h>
-
 #include <algorithm>
-#include <cstdlib>
-#include <exception>
 #include <map>
 #include <memory>
-#include <new>
 
 #include "algorithms/io/scenes/scene_files.h"
+#include "algorithms/io/scenes/xml_reader.h"
 #include "algorithms/io/scenes/zip_archive.h"
 
 namespace hermesh::mesh_formats {
 
 namespace {
-
-/// Deepest nesting of elements in undamaged files.
-constexpr std::size_t kDeepestElement = 1000;
-constexpr std::size_t kParsedPiece = std::size_t(1) << 18;
-/// Bytes of an element's text that are stored; only short words are needed.
-constexpr std::size_t kMostText = 1000;
-/// Memory that the parsers of a thread may take. They store each name once and the current tag as a whole,
-/// which has millions of bytes only in malicious files.
-constexpr std::size_t kMostTaken = std::size_t(1) << 23;
-thread_local std::size_t taken = 0;
-
-void* take_again(void* old, std::size_t size) {
-  const std::size_t before = malloc_usable_size(old);
-  if (size > kMostTaken - std::min(taken - before, kMostTaken)) return nullptr;
-  void* const now = std::realloc(old, size);
-  if (now) taken += malloc_usable_size(now) - before;
-  return now;
-}
-void* take(std::size_t size) { return take_again(nullptr, size); }
-void give_back(void* memory) {
-  taken -= malloc_usable_size(memory);
-  std::free(memory);
-}
-constexpr XML_Memory_Handling_Suite kMemory = {take, take_again, give_back};
-
-/// Parses the XML of a member of an archive while it is unpacked, without a tree in memory, and calls the
-/// visitors of its elements. Comments, processing instructions and everything behind the first element are
-/// ignored. A document type is rejected, as formats based on XML do, since its entities can make a few bytes
-/// into millions. Errors name the line; if the archive is damaged, that is the error.
-class XmlReader {
- public:
-  using Visit = std::function<void()>;
-
-  /// Opens the member; `what` names the text in messages.
-  XmlReader(ZipArchive& archive, const std::string& member, std::string what, MeshBuilder& builder)
-      : archive_(archive),
-        what_(std::move(what)),
-        builder_(builder),
-        parser_(XML_ParserCreate_MM(nullptr, &kMemory, nullptr)) {
-    archive_.open(member);
-    XML_Parser const parser = parser_.get();
-    if (!parser) throw std::bad_alloc();
-    XML_SetUserData(parser, this);
-    XML_SetElementHandler(
-        parser,
-        [](void* user, const char* name, const char** attributes) { self(user).start(name, attributes); },
-        [](void* user, const char*) { self(user).end(); });
-    XML_SetCharacterDataHandler(parser, [](void* user, const char* piece, int size) {
-      std::string& text = self(user).text_;
-      if (self(user).text_visit_ && text.size() < kMostText)
-        self(user).guard([&] { text.append(piece, static_cast<std::size_t>(size)); });
-    });
-    // Called before the first entity is declared.
-    XML_SetStartDoctypeDeclHandler(parser, [](void* user, const char*, const char*, const char*, int) {
-      self(user).guard([&] { self(user).fail("a document type, which files of this kind must not have"); });
-    });
-  }
-  XmlReader(const XmlReader&) = delete;
-  XmlReader& operator=(const XmlReader&) = delete;
-
-  /// Parses the text and calls `visit` at the start of its first element. @throws Error if the text is not
-  /// well-formed or the archive is damaged, and everything that a visitor throws.
-  void read(const Visit& visit) {
-    visits_ = {visit};
-    XML_ParsingStatus state = {XML_INITIALIZED, XML_FALSE};
-    while (state.parsing != XML_FINISHED) {
-      builder_.context().check();
-      void* const room = XML_GetBuffer(parser_.get(), kParsedPiece);
-      if (!room) fail_by(XML_GetErrorCode(parser_.get()));
-      const std::size_t size = archive_.read({static_cast<char*>(room), kParsedPiece});
-      const XML_Status status = XML_ParseBuffer(parser_.get(), static_cast<int>(size), size == 0);
-      if (thrown_) std::rethrow_exception(thrown_);
-      XML_GetParsingStatus(parser_.get(), &state);
-      // end() aborts at the end of the first element.
-      const XML_Error error = XML_GetErrorCode(parser_.get());
-      if (status != XML_STATUS_OK && error != XML_ERROR_ABORTED) fail_by(error);
-    }
-    read_rest();
-  }
-
-  // For visitors, about the element that has just started.
-
-  /// Calls `visit` at the start of each child, after the caller has returned: references in `visit` must be
-  /// valid until then.
-  void for_each_child(Visit visit) { visits_.back() = std::move(visit); }
-  /// Calls `visit` at the end of the element with its text, cut to about a thousand bytes.
-  void for_text(std::function<void(std::string_view)> visit) {
-    text_visit_ = std::move(visit);
-    text_level_ = visits_.size();
-    text_.clear();
-  }
-  /// Returns the name without the prefix of its namespace.
-  std::string_view name() const { return name_.substr(name_.find(':') + 1); }
-  /// True if the element has this name, and the prefix of the first element.
-  bool is(std::string_view name) const { return this->name() == name && prefix() == root_prefix_; }
-  /// Returns the value of an attribute by its whole name.
-  std::optional<std::string_view> attribute(std::string_view name) const {
-    for (const char** each = attributes_; *each; each += 2)
-      if (each[0] == name) return each[1];
-    return std::nullopt;
-  }
-  /// Returns the prefix that the element declares for a namespace whose address contains `part`.
-  std::optional<std::string_view> prefix_for(std::string_view part) const {
-    constexpr std::string_view declares = "xmlns:";
-    for (const char** each = attributes_; *each; each += 2)
-      if (std::string_view(each[0]).starts_with(declares) &&
-          std::string_view(each[1]).find(part) != std::string_view::npos)
-        return each[0] + declares.size();
-    return std::nullopt;
-  }
-  /// @throws Error about the current line.
-  template <class... Parts>
-  [[noreturn]] void fail(const Parts&... what) {
-    const std::size_t line = XML_GetCurrentLineNumber(parser_.get());
-    // If the archive is damaged, that is the cause of a wrong text.
-    read_rest();
-    builder_.fail("line ", line, " of its ", what_, ": ", what...);
-  }
-
- private:
-  struct Free {
-    void operator()(XML_Parser parser) const { XML_ParserFree(parser); }
-  };
-  static XmlReader& self(void* user) { return *static_cast<XmlReader*>(user); }
-
-  /// Runs `work` for the parser, which calls from C, so no exception may leave it.
-  template <class Work>
-  void guard(Work&& work) {
-    // The parser reports the end of an element even if it was stopped at its start.
-    if (thrown_) return;
-    try {
-      work();
-    } catch (...) {
-      thrown_ = std::current_exception();
-      XML_StopParser(parser_.get(), XML_FALSE);
-    }
-  }
-  void start(const char* name, const char** attributes) {
-    guard([&] {
-      builder_.tick(archive_.done(), archive_.size());
-      if (visits_.size() > kDeepestElement) fail("elements are nested too deeply; the file is damaged");
-      name_ = name, attributes_ = attributes;
-      if (visits_.size() == 1) root_prefix_ = prefix();
-      visits_.emplace_back();
-      if (const Visit& visit = visits_[visits_.size() - 2]) visit();
-    });
-  }
-  void end() {
-    guard([&] {
-      if (text_visit_ && visits_.size() == text_level_) std::exchange(text_visit_, nullptr)(text_);
-      visits_.pop_back();
-      if (visits_.size() == 1) XML_StopParser(parser_.get(), XML_FALSE);
-    });
-  }
-  std::string_view prefix() const {
-    const std::size_t colon = name_.find(':');
-    return name_.substr(0, colon == std::string_view::npos ? 0 : colon);
-  }
-  /// Reads the rest of the member, whose checksum is compared at its end.
-  void read_rest() {
-    std::string room(kParsedPiece, '\0');
-    while (archive_.read(room) > 0) builder_.context().check();
-  }
-  [[noreturn]] void fail_by(XML_Error error) {
-    switch (error) {
-      case XML_ERROR_NO_ELEMENTS:
-      case XML_ERROR_UNCLOSED_TOKEN:
-      case XML_ERROR_PARTIAL_CHAR:
-      case XML_ERROR_UNCLOSED_CDATA_SECTION:
-        fail("the text breaks off; the file is truncated or damaged");
-      case XML_ERROR_NO_MEMORY:
-        fail("a tag of millions of bytes, or as many names; the file is damaged");
-      default:
-        fail(XML_ErrorString(error), "; the file is damaged");
-    }
-  }
-
-  ZipArchive& archive_;
-  std::string what_;
-  MeshBuilder& builder_;
-  std::unique_ptr<XML_ParserStruct, Free> parser_;
-  std::exception_ptr thrown_;
-  std::vector<Visit> visits_;  ///< of the children of each open element; the first one is for the root
-  std::function<void(std::string_view)> text_visit_;
-  std::size_t text_level_ = 0;
-  std::string text_;
-  std::string_view name_;
-  const char** attributes_ = nullptr;  ///< keys and values in turn, then null
-  std::string root_prefix_;
-};
 
 /// Deepest nesting of components; a file beyond it is damaged, or contains itself.
 constexpr int kDeepestObject = 100;
@@ -261,6 +66,7 @@ class ThreeMfReader {
     // The memory of all copies is checked before the first one is made.
     for (const Component& item : items_) placer_.spend(cost_of(item.object, 0));
     for (const Component& item : items_) place(item, Placement());
+    placer_.name_materials(material_names_);
     placer_.note_left_out();
     note_left_out();
     if (by_hermesh_ && items_.size() == 1 && items_[0].is_placed)
@@ -319,6 +125,7 @@ class ThreeMfReader {
     if (xml.is("resources"))
       xml.for_each_child([&] {
         if (xml.is("object")) read_object(xml, model);
+        if (builder_.attributes()) read_properties(xml, model);
       });
     else if (root && xml.is("metadata") && xml.attribute("name") == "Application")
       xml.for_text([this](std::string_view text) { by_hermesh_ = trimmed(text) == "hermesh"; });
@@ -347,6 +154,71 @@ class ThreeMfReader {
     }
   }
 
+  /// Reads a list of colours (of the materials extension) or of materials, to which triangles refer.
+  void read_properties(XmlReader& xml, const std::string& model) {
+    const std::optional<std::uint32_t> id = whole_number_if_any(xml, "id");
+    if (!id) return;
+    const ObjectKey key{model, *id};
+    if (xml.name() == "colorgroup")
+      xml.for_each_child([this, &xml, key] {
+        if (xml.name() == "color")
+          properties_[key].push_back({colour_of(xml.attribute("color").value_or("")), -1});
+      });
+    if (xml.is("basematerials"))
+      xml.for_each_child([this, &xml, key] {
+        if (!xml.is("base")) return;
+        properties_[key].push_back({std::nullopt, static_cast<std::int32_t>(material_names_.size())});
+        material_names_.emplace_back(xml.attribute("name").value_or(""));
+      });
+  }
+
+  /// Parses a colour #RRGGBB or #RRGGBBAA; nothing if it is none.
+  static std::optional<std::array<float, 4>> colour_of(std::string_view text) {
+    text = trimmed(text);
+    std::array<float, 4> colour = {0, 0, 0, 1};
+    if (!text.starts_with('#') || (text.size() != 7 && text.size() != 9)) return std::nullopt;
+    for (std::size_t k = 0; 2 * k + 1 < text.size(); ++k) {
+      unsigned value = 0;
+      const char* const digits = text.data() + 1 + 2 * k;
+      if (std::from_chars(digits, digits + 2, value, 16).ptr != digits + 2) return std::nullopt;
+      colour[k] = static_cast<float>(value) / 255.0f;
+    }
+    return colour;
+  }
+
+  /// A triangle's properties: those of its own, or else of its object.
+  struct Property {
+    std::optional<std::array<float, 4>> colour;
+    std::int32_t material;  ///< number of its name, -1 for none
+  };
+
+  /// Takes the colours or the material of the part's last triangle, which has just started.
+  void take_properties(XmlReader& xml, const std::string& model, std::optional<std::uint32_t> group,
+                       std::optional<std::uint32_t> index, ScenePart& part) {
+    if (const auto own = whole_number_if_any(xml, "pid")) group = own;
+    if (const auto own = whole_number_if_any(xml, "p1")) index = own;
+    if (!group || !index) return;
+    const auto found = properties_.find({model, *group});
+    if (found == properties_.end()) return;  // of another kind, such as textures
+    const Triangle& triangle = part.triangles.back();
+    for (std::size_t k = 0; k < 3; ++k) {
+      const char* const keys[] = {"p1", "p2", "p3"};
+      const std::uint32_t at = k == 0 ? *index : whole_number_if_any(xml, keys[k]).value_or(*index);
+      if (at >= found->second.size())
+        return placer_.leave_out_attribute(
+            "colour", "a triangle refers to property " + std::to_string(at) + " of a group of " +
+                          std::to_string(found->second.size()) + " (counting from 0)");
+      const Property& property = found->second[at];
+      if (property.colour) {
+        if ((*property.colour)[3] < 1.0f) placer_.keep_alpha();
+        other_colours_ += !part.set_colour(triangle[k], *property.colour);
+      } else if (property.material >= 0 && k == 0) {
+        part.materials.resize(part.triangles.size(), -1);
+        part.materials.back() = property.material;
+      }
+    }
+  }
+
   /// Reads an object, which is a mesh or is composed of others; all else belongs to extensions.
   void read_object(XmlReader& xml, const std::string& model) {
     const ObjectKey key{model, whole_number(xml, "id")};
@@ -356,10 +228,11 @@ class ThreeMfReader {
     SceneObject& object = objects_[key];
     const std::string_view type = xml.attribute("type").value_or("model");
     object.is_printed = type == "model" || type == "surface";
-    xml.for_each_child([&] {
-      if (xml.is("mesh")) read_mesh(xml, object.part);
+    const auto group = whole_number_if_any(xml, "pid"), index = whole_number_if_any(xml, "pindex");
+    xml.for_each_child([this, &xml, &model, &object, group, index] {
+      if (xml.is("mesh")) read_mesh(xml, model, group, index, object.part);
       if (xml.is("components"))
-        xml.for_each_child([&] {
+        xml.for_each_child([this, &xml, &model, &object] {
           if (xml.is("component")) object.components.push_back(read_component(xml, model));
         });
     });
@@ -367,7 +240,8 @@ class ThreeMfReader {
 
   /// Reads a mesh and merges points with equal coordinates: the format wants them shared, but some programs
   /// write each triangle with points of its own.
-  void read_mesh(XmlReader& xml, ScenePart& part) {
+  void read_mesh(XmlReader& xml, const std::string& model, std::optional<std::uint32_t> group,
+                 std::optional<std::uint32_t> index, ScenePart& part) {
     struct Points {
       PointMerger merger;
       std::vector<std::uint32_t> numbers;
@@ -379,11 +253,12 @@ class ThreeMfReader {
         points->numbers.push_back(
             points->merger.add({coordinate(xml, "x"), coordinate(xml, "y"), coordinate(xml, "z")}));
     };
-    const auto add_triangle = [&xml, &part, points] {
+    const auto add_triangle = [this, &xml, &model, &part, points, group, index] {
       const std::vector<std::uint32_t>& numbers = points->numbers;
-      if (xml.is("triangle"))
-        part.triangles.push_back(
-            {corner(xml, "v1", numbers), corner(xml, "v2", numbers), corner(xml, "v3", numbers)});
+      if (!xml.is("triangle")) return;
+      part.triangles.push_back(
+          {corner(xml, "v1", numbers), corner(xml, "v2", numbers), corner(xml, "v3", numbers)});
+      if (builder_.attributes()) take_properties(xml, model, group, index, part);
     };
     xml.for_each_child([this, &xml, add_point, add_triangle] {
       lattices_ += xml.name() == "beamlattice";
@@ -445,6 +320,9 @@ class ThreeMfReader {
   }
 
   void note_left_out() {
+    if (other_colours_ > 0)
+      builder_.note("corners with another colour than their point elsewhere, which has one, the first: ",
+                    other_colours_);
     if (not_printed_ > 0)
       builder_.note("objects left out because they are support or not to be printed: ", not_printed_);
     if (negative_ > 0) builder_.note("parts left out that a slicer subtracts, as combine can: ", negative_);
@@ -509,6 +387,15 @@ class ThreeMfReader {
     return value;
   }
 
+  /// Parses an attribute as above, for what must not cost the mesh: nothing if it is none.
+  static std::optional<std::uint32_t> whole_number_if_any(XmlReader& xml, const char* key) {
+    const std::string_view digits = trimmed(xml.attribute(key).value_or(""));
+    std::uint32_t value = 0;
+    const auto [rest, error] = std::from_chars(digits.data(), digits.data() + digits.size(), value);
+    if (error != std::errc() || rest != digits.data() + digits.size()) return std::nullopt;
+    return value;
+  }
+
   /// Parses a corner of a triangle. The points precede the triangles, so it can be checked at once.
   static std::uint32_t corner(XmlReader& xml, const char* key, const std::vector<std::uint32_t>& numbers) {
     const std::uint32_t value = whole_number(xml, key);
@@ -559,11 +446,13 @@ class ThreeMfReader {
   std::vector<std::string> models_;
   std::map<ObjectKey, SceneObject> objects_;
   std::vector<Component> items_;
+  std::map<ObjectKey, std::vector<Property>> properties_;  ///< groups, by their file and number there
+  std::vector<std::string> material_names_;
   std::string path_attribute_;
   bool by_hermesh_ = false;
   // Numbers of what was left out: objects, or placements of them, and parts that a slicer subtracts or uses
   // to change settings.
-  std::size_t not_printed_ = 0, lattices_ = 0, negative_ = 0, modifiers_ = 0;
+  std::size_t not_printed_ = 0, lattices_ = 0, negative_ = 0, modifiers_ = 0, other_colours_ = 0;
 };
 
 }  // namespace

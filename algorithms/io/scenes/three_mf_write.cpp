@@ -1,5 +1,7 @@
 // 3MF out: one object, one item of the build.
 #include <algorithm>
+#include <cmath>
+#include <map>
 
 #include "algorithms/io/scenes/scene_files.h"
 #include "algorithms/io/scenes/zip_archive.h"
@@ -25,9 +27,38 @@ constexpr std::string_view kHeadToUnit =
     R"(<?xml version="1.0" encoding="UTF-8"?>
 <model unit=")";
 constexpr std::string_view kHeadBehindUnit =
-    R"(" xml:lang="en-US" xmlns="http://schemas.microsoft.com/3dmanufacturing/core/2015/02">
+    R"(" xml:lang="en-US" xmlns="http://schemas.microsoft.com/3dmanufacturing/core/2015/02")";
+constexpr std::string_view kColours =
+    R"( xmlns:m="http://schemas.microsoft.com/3dmanufacturing/material/2015/02")";
+constexpr std::string_view kHeadEnd = R"(>
 <metadata name="Application">hermesh</metadata>
 )";
+
+/// Returns the text with the characters that XML reserves, and those that it forbids, replaced.
+std::string escaped(std::string_view text) {
+  std::string result;
+  for (const char c : text) {
+    if (c == '&')
+      result += "&amp;";
+    else if (c == '<')
+      result += "&lt;";
+    else if (c == '"')
+      result += "&quot;";
+    else
+      result += static_cast<unsigned char>(c) < ' ' ? '?' : c;
+  }
+  return result;
+}
+
+/// Returns a colour of 0 to 1 as #RRGGBB or, if it has four components, #RRGGBBAA.
+std::string hexadecimal(const float* colour, std::size_t components) {
+  std::string text = "#";
+  for (std::size_t k = 0; k < components; ++k) {
+    const long level = std::lround(255.0f * std::clamp(colour[k], 0.0f, 1.0f));
+    for (const long digit : {level / 16, level % 16}) text += "0123456789ABCDEF"[digit];
+  }
+  return text;
+}
 
 /// Writes the text of a model: the object and the build.
 class ModelWriter {
@@ -35,25 +66,38 @@ class ModelWriter {
   ModelWriter(ZipWriter& archive, const RunContext& context) : archive_(archive), context_(context) {}
 
   /// Writes the model and returns the number of triangles that were left out.
-  std::size_t write(const PolygonMesh& mesh, double metres) {
+  std::size_t write(const PolygonMesh& mesh, double metres, const NamedAttributes& named) {
     const auto known = std::ranges::find(kThreeMfUnits, metres, &std::pair<std::string_view, double>::second);
     const bool stated = known != std::end(kThreeMfUnits);
     const double scale = stated || !(metres > 0.0) ? 1.0 : 1000.0 * metres;
     text(kHeadToUnit).text(stated ? known->first : "millimeter").text(kHeadBehindUnit);
+    text(named.colour ? kColours : "").text(kHeadEnd);
     if (mesh.empty()) {
       text("<resources/>\n<build/>\n</model>\n").flush();
       return 0;
     }
-    text("<resources>\n<object id=\"1\" type=\"model\"><mesh><vertices>\n");
+    text("<resources>\n");
+    write_properties(mesh, named);
+    text("<object id=\"1\" type=\"model\"");
+    if (!colours_.empty() || !materials_.empty()) text(" pid=\"2\" pindex=\"0\"");
+    text("><mesh><vertices>\n");
     // As doubles, which is how text is read: the few digits that identify a float are another double.
     for (const Eigen::Vector3f& point : mesh.points) {
       text("<vertex x=\"").number(double(point.x())).text("\" y=\"").number(double(point.y()));
       text("\" z=\"").number(double(point.z())).text("\"/>\n");
     }
     text("</vertices><triangles>\n");
+    std::size_t number_of_triangle = 0;
     for_each_triangle(mesh, [&](std::uint32_t a, std::uint32_t b, std::uint32_t c) {
+      const std::size_t t = number_of_triangle++;
       if (a == b || b == c || c == a) return void(++left_out_);
-      text("<triangle v1=\"").number(a).text("\" v2=\"").number(b).text("\" v3=\"").number(c).text("\"/>\n");
+      text("<triangle v1=\"").number(a).text("\" v2=\"").number(b).text("\" v3=\"").number(c);
+      if (!colours_.empty()) {
+        text("\" p1=\"").number(colours_[a]).text("\" p2=\"").number(colours_[b]);
+        text("\" p3=\"").number(colours_[c]);
+      }
+      if (!materials_.empty()) text("\" p1=\"").number(material(t, mesh.triangles.size()));
+      text("\"/>\n");
     });
     text("</triangles></mesh></object>\n</resources>\n<build><item objectid=\"1\"");
     // The origin is the translation of the item, so that readers in single precision lose least of the shape.
@@ -68,6 +112,39 @@ class ModelWriter {
   }
 
  private:
+  /// Writes a group of the different colours of the points, or of the names of materials, which then are
+  /// property group 2.
+  void write_properties(const PolygonMesh& mesh, const NamedAttributes& named) {
+    if (named.colour) {
+      const std::vector<float>& values = std::get<0>(named.colour->values);
+      const auto components = static_cast<std::size_t>(named.colour->components);
+      std::map<std::string, std::uint32_t> numbers;
+      text("<m:colorgroup id=\"2\">\n");
+      for (std::size_t i = 0; i < mesh.points.size(); ++i) {
+        const std::string colour = hexadecimal(&values[components * i], components);
+        const auto [at, is_new] = numbers.try_emplace(colour, static_cast<std::uint32_t>(numbers.size()));
+        if (is_new) text("<m:color color=\"").text(colour).text("\"/>\n");
+        colours_.push_back(at->second);
+      }
+      text("</m:colorgroup>\n");
+    } else if (named.material) {
+      materials_ = std::get<1>(named.material->values);
+      none_ = static_cast<std::int32_t>(named.material->labels.size());
+      text("<basematerials id=\"2\">\n");
+      for (const std::string& label : named.material->labels)
+        text("<base name=\"").text(escaped(label)).text("\" displaycolor=\"#808080\"/>\n");
+      if (std::ranges::any_of(materials_, [this](std::int32_t m) { return m < 0 || m >= none_; }))
+        text("<base name=\"none\" displaycolor=\"#808080\"/>\n");
+      text("</basematerials>\n");
+    }
+  }
+  /// Returns the property of a triangle; two of them are one quad.
+  std::int32_t material(std::size_t triangle, std::size_t triangles) const {
+    const std::size_t polygon = triangle < triangles ? triangle : triangles + (triangle - triangles) / 2;
+    const std::int32_t number = materials_[polygon];
+    return number < 0 || number >= none_ ? none_ : number;
+  }
+
   ModelWriter& text(std::string_view text) {
     piece_ += text;
     if (piece_.size() >= kPiece) flush();
@@ -89,6 +166,9 @@ class ModelWriter {
   const RunContext& context_;
   std::string piece_;
   std::size_t left_out_ = 0;
+  std::vector<std::uint32_t> colours_;   ///< of points, by their number in the group
+  std::vector<std::int32_t> materials_;  ///< of polygons
+  std::int32_t none_ = 0;                ///< number of the material of polygons that have none
 };
 
 }  // namespace
@@ -103,10 +183,21 @@ void write_three_mf(const ByteSink& out, const PolygonMesh& mesh, double metres,
     archive.begin(name, 0.0);
     archive.write(text);
   }
-  // Bounds of a line: three doubles of 24 characters, three indices of 10.
-  archive.begin("3D/3dmodel.model",
-                1000.0 + 110.0 * double(mesh.points.size()) + 70.0 * double(mesh.triangle_count()));
-  const std::size_t left_out = ModelWriter(archive, context).write(mesh, metres);
+  // Bounds of a line: three doubles of 24 characters, three indices of 10; a colour and three more indices.
+  double of_properties = 0.0;
+  for (const MeshAttribute& attribute : mesh.attributes) {
+    for (const std::string& label : attribute.labels) of_properties += 50.0 + 6.0 * double(label.size());
+    of_properties += 35.0 * double(mesh.points.size()) + 55.0 * double(mesh.triangle_count());
+  }
+  archive.begin("3D/3dmodel.model", 1000.0 + 110.0 * double(mesh.points.size()) +
+                                        70.0 * double(mesh.triangle_count()) + of_properties);
+  // A triangle has properties of one group only.
+  const bool colour = std::ranges::any_of(mesh.attributes, [](const MeshAttribute& attribute) {
+    return attribute.name == "colour" && attribute.domain == AttributeDomain::point;
+  });
+  const NamedAttributes named =
+      named_attributes(mesh.attributes, colour ? "colour alpha" : "material", "a 3MF", file, context);
+  const std::size_t left_out = ModelWriter(archive, context).write(mesh, metres, named);
   if (left_out > 0)
     context.note(joined(in_quotes(file), ": ", left_out,
                         " triangles with a corner twice were left out, which 3MF forbids"));

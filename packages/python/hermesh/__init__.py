@@ -291,7 +291,7 @@ def read_mesh(path: str | os.PathLike[str], *, attributes: bool = False, progres
     path : path-like
         The extension of the name specifies the format.
     attributes : bool, default False
-        True to read the attributes of PLY and OBJ files, too.
+        True to read the attributes of PLY, OBJ, glTF and 3MF files, too.
     progress, cancel, threads, log : optional
         See the module `hermesh`.
 

@@ -90,7 +90,7 @@ class HERMESH_API Mesh {
 
 /// Reads PLY (ASCII, binary), OBJ, OFF (text, binary), STL, glTF 2.0 or 3MF, each also gzipped. The extension
 /// of the name gives the format. Polygons of more corners are split into triangles. Adds a note for each
-/// tolerated fault. With `attributes` those of PLY and OBJ are read, too.
+/// tolerated fault. With `attributes` those of PLY, OBJ, glTF and 3MF are read, too.
 /// @throws Error for a file that is missing, damaged, of another type or without polygons; Cancelled.
 HERMESH_API Mesh read_mesh(const std::filesystem::path& path, Context& context, bool attributes = false);
 
