@@ -1,6 +1,8 @@
 // Small inputs that once went wrong, with their right answers (files in inputs/; volumes are closed forms).
 
+#include <Eigen/Geometry>
 #include <cmath>
+#include <fstream>
 #include <numbers>
 #include <sstream>
 
@@ -41,6 +43,50 @@ TEST_F(RightAnswersTest, ABudgetEndsAtTheExactMesh) {
   const Json gear = remesh("gear9.off", "--triangles 500");
   EXPECT_LE(gear["mesh"]["triangles"], 500);
   EXPECT_NEAR(gear["mesh"]["volume"].get<double>(), 0.9201, 1e-3);
+}
+
+TEST_F(RightAnswersTest, TurnedProfilesWithAConcaveCreaseAreExact) {
+  // In these positions four vertices of a quad lie on a crease that ends at a corner, or a vertex just beyond
+  // the corner blocked its place: one corner was off by 0.002 voxel.
+  struct Placed {
+    double voxel;
+    Eigen::Quaterniond turn;
+    Eigen::Vector3d shift;
+  };
+  const Placed placed[] = {{0.08333333333333333,
+                            {-0.0964915, 0.83942588, -0.07686, -0.52928832},
+                            {-0.98790598, 0.31921019, -0.61611376}},
+                           {0.021011933581689395,
+                            {0.53535957, 0.75907285, 0.3622206, 0.07742591},
+                            {0.20578803, 0.91555308, 0.06622219}},
+                           {0.03479238838239562,
+                            {-0.41237378, -0.32085148, -0.62698727, -0.57783142},
+                            {-0.78001363, -0.75431496, 0.83458972}}};
+  const double outline[6][2] = {{0, 0}, {1, 0}, {1, 0.4}, {0.4, 0.4}, {0.4, 1}, {0, 1}};
+  for (const auto& [voxel, turn, shift] : placed) {
+    std::ostringstream text;
+    text.precision(17);
+    text << "OFF\n12 8 0\n";
+    for (const double height : {0.0, 0.5})
+      for (const auto& [x, y] : outline) {
+        const Eigen::Vector3d p = turn.normalized() * Eigen::Vector3d(x, y, height) + shift;
+        text << p.x() << ' ' << p.y() << ' ' << p.z() << '\n';
+      }
+    text << "6 5 4 3 2 1 0\n6 6 7 8 9 10 11\n";
+    for (int i = 0; i < 6; ++i) {
+      const int next = (i + 1) % 6;
+      text << "4 " << i << ' ' << next << ' ' << next + 6 << ' ' << i + 6 << '\n';
+    }
+    std::ofstream(path("profile.off")) << text.str();
+    std::ostringstream size;
+    size.precision(17);
+    size << voxel;
+    EXPECT_EQ(run("remesh profile.off out.ply --voxel-size " + size.str()).exit_code, 0);
+    const Json report = Json::parse(run("validate out.ply --reference profile.off --json").out);
+    EXPECT_EQ(report["triangles"], 20);
+    EXPECT_LE(report["to_reference"]["max"], 1e-5 * voxel);
+    EXPECT_LE(report["from_reference"]["max"], 1e-5 * voxel);
+  }
 }
 
 TEST_F(RightAnswersTest, AThinPlateIsNotCertifiedAsSpecks) {

@@ -8,14 +8,15 @@ namespace hermesh {
 CertifiedMesh decimate_certified(const FineMesh& fine, const std::vector<float>& tolerance,
                                  std::vector<std::uint8_t> pinned, const FilePoints& file,
                                  RunContext& context, const Nearness& nearness,
-                                 std::span<const TrianglePieces> pieces, const Bounds& within) {
+                                 std::span<const TrianglePieces> pieces, const Bounds& within,
+                                 std::span<const MissedTarget> missed) {
   // Another pass is worth its time if the last one and its proof removed this share of the vertices.
   constexpr double kWorthAnother = 0.05;
   constexpr int kMostPasses = 3;
   pinned.resize(tolerance.size());
   for (std::size_t p = 0; p < tolerance.size(); ++p)
     if (!(tolerance[p] > 0)) pinned[p] = 1;
-  const DecimationInput input{fine, tolerance, pinned, nearness.moment, file, within};
+  const DecimationInput input{fine, tolerance, pinned, nearness.moment, file, within, missed};
   const auto timed = [&](const char* name, auto&& work) {
     Stage stage(context, name);
     return work();

@@ -19,6 +19,7 @@
 #include "algorithms/extraction/certified_collapse/fine_mesh.h"
 #include "algorithms/extraction/certified_collapse/shell_volumes.h"
 #include "algorithms/extraction/embedded_mesh/file_points.h"
+#include "algorithms/extraction/embedded_mesh/point_target.h"
 
 namespace hermesh {
 
@@ -53,11 +54,13 @@ struct Nearness {
 /// @param pieces of each triangle of a complex (shell_volumes.h); empty for a closed mesh
 /// @param within open box that all positions of merged vertices lie in; it must contain the triangles around
 ///   the vertices that are not pinned
+/// @param missed better positions of vertices of `fine`, ascending (UniformMesh)
 /// @throws Cancelled
 CertifiedMesh decimate_certified(const FineMesh& fine, const std::vector<float>& tolerance,
                                  std::vector<std::uint8_t> pinned, const FilePoints& file,
                                  RunContext& context, const Nearness& nearness = {},
                                  std::span<const TrianglePieces> pieces = {},
-                                 const Bounds& within = Bounds::unbounded());
+                                 const Bounds& within = Bounds::unbounded(),
+                                 std::span<const MissedTarget> missed = {});
 
 }  // namespace hermesh

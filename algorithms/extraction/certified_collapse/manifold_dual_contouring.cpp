@@ -17,7 +17,8 @@ CertifiedPolygons by_collapses(UniformMesh uniform, const FieldAtPoints& field, 
   std::vector<float> asked(fine.points().size());
   parallel_blocks(asked.size(), context,
                   [&](std::size_t i) { asked[i] = field.tolerance(fine.points()[i], tolerance); });
-  CertifiedMesh coarse = decimate_certified(fine, asked, {}, file, context, nearness);
+  CertifiedMesh coarse =
+      decimate_certified(fine, asked, {}, file, context, nearness, {}, Bounds::unbounded(), uniform.missed);
   CertifiedPolygons result{std::move(coarse.points), std::move(coarse.triangles), {}, {}};
   if (field.leaves_out_outside())
     // Vertices that moved were merged; vertices in the mask have a tolerance.

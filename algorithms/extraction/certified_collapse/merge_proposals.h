@@ -11,6 +11,7 @@
 #include "algorithms/extraction/certified_collapse/merge_forest.h"
 #include "algorithms/extraction/certified_collapse/merge_proof.h"
 #include "algorithms/extraction/embedded_mesh/file_points.h"
+#include "algorithms/extraction/embedded_mesh/point_target.h"
 
 namespace hermesh {
 
@@ -24,8 +25,9 @@ struct DecimationInput {
   /// is the area-weighted sum of squared distances of the new vertex to the planes of the current triangles
   /// around the edge: memoryless, cheapest first (Lindstrom & Turk 1998).
   double moment;
-  const FilePoints& file;  ///< rounds positions to the file's precision
-  Bounds within;           ///< open box that contains all positions of merged vertices
+  const FilePoints& file;                     ///< rounds positions to the file's precision
+  Bounds within;                              ///< open box that contains all positions of merged vertices
+  std::span<const MissedTarget> missed = {};  ///< by vertex of `fine`, ascending
 
   bool admits(const Eigen::Vector3d& place) const {
     return (place.array() > within.lower.array()).all() && (place.array() < within.upper.array()).all();
@@ -63,7 +65,8 @@ void propose_relaxation(MergeForest& forest, const MergedMesh& merged, const Dec
 
 /// Moves vertices of the mesh of the settled `forest` to the nearest vertex of the fine mesh that they
 /// represent, if it is within a fiftieth of a voxel: sums in single precision are off by up to a thousandth
-/// of a voxel at the corner of a polyhedron, where the fine vertex is exact.
+/// of a voxel at the corner of a polyhedron, where the fine vertex is exact. If that has missed its target,
+/// the merged vertex moves to the target.
 /// @param merged that mesh, or one before further collapses
 void propose_members(MergeForest& forest, const MergedMesh& merged, const DecimationInput& input,
                      const RunContext& context);

@@ -259,9 +259,13 @@ void propose_members(MergeForest& forest, const MergedMesh& merged, const Decima
       if (here < squared) squared = here, nearest[v] = p;
     }
   });
-  for (std::size_t v = 0; v < nearest.size(); ++v)
-    if (nearest[v] != FineMesh::kNone)
-      move(forest, merged.leaders[v], input.fine.points()[nearest[v]], input);
+  for (std::size_t v = 0; v < nearest.size(); ++v) {
+    const std::uint32_t p = nearest[v];
+    if (p == FineMesh::kNone) continue;
+    const auto missed = std::ranges::lower_bound(input.missed, p, {}, &MissedTarget::point);
+    const bool found = missed != input.missed.end() && missed->point == p;
+    move(forest, merged.leaders[v], found ? missed->place : input.fine.points()[p], input);
+  }
   forest.settle();
 }
 

@@ -74,6 +74,22 @@ class Star {
     box_.upper.array() += kBoxMargin;
   }
 
+  /// Returns the direction from a place to that vertex around this one which is most towards it: on a
+  /// polyhedron such a vertex lies in a plane through the place, and so does the segment.
+  Vector3d direction_from(const Vector3d& place) const {
+    const Vector3d back = (points_[point_] - place).normalized();
+    Vector3d best = back;
+    double most = -1.0;
+    for (const SidedTriangle& t : star_)
+      for (const std::uint32_t p : t.corners) {
+        const Vector3d there = points_[p] - place;
+        if (p == point_ || there.norm() < 10.0 * kBefore) continue;
+        if (const double along = there.normalized().dot(back); along > most)
+          most = along, best = there.normalized();
+      }
+    return best;
+  }
+
   /// Moves the vertex if the mesh stays embedded and its orientation is unchanged. Quads one of whose
   /// triangles has no area then, as with three corners on a crease, are cut along the other diagonal, and
   /// added to `turned`. The trial modifies the mesh itself, of which no other thread reads this part
@@ -230,7 +246,7 @@ void move_points(const CellBlocks& cells, EdgePolygons& polygons,
   Stage stage(context, "move points");
   PolygonNeighbourhood mesh(cells, polygons, points, kFarthestFromCell);
   std::vector<std::vector<CellBlocks::Edge>> turned(cells.size());
-  // A vertex so near to its target does not move.
+  // A vertex so near to its target moves to the target itself or not at all.
   const double fulfilled = 2.0 * cells.margin();
   // A vertex's polygons end within two voxels of its cell. Those that might intersect them belong to edges at
   // most six samples away, with vertices in cells at most seven away. So moves in blocks of one parity, eight
@@ -246,18 +262,17 @@ void move_points(const CellBlocks& cells, EdgePolygons& polygons,
         Star star(cells, polygons, mesh, points);
         for (const PointTarget& target : targets[b]) {
           const Vector3d from = points[cells.point(block, target.cell, 0)];
-          if ((target.place - from).norm() < fulfilled || polygons.is_crowded({block, target.cell})) continue;
+          if (file.rounded(target.place) == from || polygons.is_crowded({block, target.cell})) continue;
           star.gather(block, target.cell, {target.place, target.nearer});
           const Vector3d between = 0.5 * (target.place + target.nearer),
                          halfway = 0.5 * (from + target.nearer);
           // From the best position to the least move: the target, halfway from it to the nearer position,
           // that, just before the target, which may be the vertex of another cell, and one half and one
           // quarter of the distance to the nearer position.
-          const Vector3d before = target.place + kBefore * (from - target.place).normalized();
+          const Vector3d before = target.place + kBefore * star.direction_from(target.place);
           for (const Vector3d& place :
                {target.place, between, target.nearer, before, halfway, Vector3d(0.5 * (from + halfway))}) {
-            if ((place - from).norm() < fulfilled) break;
-            if (star.moves_to(file.rounded(place), turned[b])) break;
+            if (star.moves_to(file.rounded(place), turned[b]) || (place - from).norm() < fulfilled) break;
           }
         }
       });

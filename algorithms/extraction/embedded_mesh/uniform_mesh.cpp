@@ -30,9 +30,14 @@ constexpr double kGoodEnough = 0.005;
 
 /// Largest distance beyond a corner of a vertex that misses its third plane, voxels.
 constexpr double kLongestSpur = 1.0;
+/// Least distance before the corner that such a vertex is turned back to, about, voxels.
+constexpr double kLeastBack = 0.1;
 
 /// Least cosine of the angle between the directions of one crease in two cells.
 constexpr double kSameLine = 0.9999;
+
+/// Distance of a vertex from its target, which it has missed by little, voxels.
+constexpr double kNextTo = 0.01;
 
 /// Part of the distance from the boundary between voxels that is left for rounding, voxels.
 constexpr double kRounding = 1e-4;
@@ -83,6 +88,7 @@ class UniformContourer {
     fill(polygons, mesh, context);
     // Only vertices with a target can have left their cells.
     for_each_with_target([&](double outside) { counts_.escaped += outside > cells_.rounding().maxCoeff(); });
+    mesh.missed = missed_targets();
     if (tiling_.keys) *tiling_.keys = vertex_keys(cells_, polygons, context);
     mesh.points = points_.take();
     mesh.counts = std::move(counts_);
@@ -197,8 +203,15 @@ class UniformContourer {
            .most_error_held = static_cast<float>(kGoodEnough * kGoodEnough)},
           out, is_placed.data());
     }
+    // So are vertices that the vector code held off a face, as where a plane cuts off a corner of the cell.
+    const auto least = static_cast<float>(1.01 * cells_.margin());
+    const auto is_held = [&](std::size_t i) {
+      return has_exact_planes() && std::ranges::any_of(place, [&](const auto& along) {
+               return along[i] < least || along[i] > 1.0f - least;
+             });
+    };
     for (std::size_t i = 0; i < found; ++i) {
-      if (!is_placed[i]) continue;
+      if (!is_placed[i] || is_held(i)) continue;
       set_bit(placed, cell[i]);
       points_[point[i]] = file_.rounded(near_voxels(
           block, cell[i], cells_.corner(block, cell[i]) + Vector3d(place[0][i], place[1][i], place[2][i])));
@@ -367,8 +380,8 @@ class UniformContourer {
       }
       // Other lines, as a convex crease that becomes a concave one, go on.
       if (beyond > kLongestSpur || before < 1.5 * kLongestSpur) continue;
-      // Distinct for distinct positions beyond the corner.
-      const double back = std::min(next, 1.0) * std::abs(one.at) / (1.0 + std::abs(one.at));
+      // Distinct for distinct positions beyond the corner, and not so near to it that they block its vertex.
+      const double far = kLeastBack + std::abs(one.at), back = std::min(next, 1.0) * far / (1.0 + far);
       const Vector3d place = end - std::copysign(back, one.at) * one.along;
       turned.emplace_back(one.cell, PointTarget{one.cell.cell, place, place});
     }
@@ -409,6 +422,20 @@ class UniformContourer {
                                      cells_.corner(block, target.cell) - Vector3d::Constant(0.5);
         f(from_middle.cwiseAbs().maxCoeff() - 0.5);
       }
+  }
+
+  /// Returns the targets that vertices have not reached although they are next to them.
+  std::vector<MissedTarget> missed_targets() const {
+    std::vector<MissedTarget> result;
+    for (std::size_t b = 0; b < cells_.size(); ++b)
+      for (const PointTarget& target : targets_[b]) {
+        const std::uint32_t point = cells_.point(static_cast<std::int32_t>(b), target.cell, 0);
+        const Vector3d place = file_.rounded(target.place);
+        if (place != points_[point] && (place - points_[point]).norm() < kNextTo)
+          result.push_back({point, place});
+      }
+    std::ranges::sort(result, {}, &MissedTarget::point);
+    return result;
   }
 
   /// Moves the vertex of one cell as far towards its target as its 24 tetrahedra remain positive. Cells with

@@ -80,6 +80,7 @@
 #include "algorithms/extraction/embedded_mesh/cell_blocks.h"
 #include "algorithms/extraction/embedded_mesh/edge_polygons.h"
 #include "algorithms/extraction/embedded_mesh/file_points.h"
+#include "algorithms/extraction/embedded_mesh/point_target.h"
 #include "algorithms/extraction/embedded_mesh/uniform_points.h"
 #include "algorithms/extraction/embedded_mesh/uniform_tiling.h"
 #include "algorithms/hermite/hermite_view.h"
@@ -104,6 +105,7 @@ struct UniformMesh {
   std::vector<Eigen::Vector3d> points;  ///< relative to the placement's base; FilePoints::rounded()
   LargeArray<Quad> quads;               ///< abc and acd are the triangles of a quad abcd
   std::vector<Triangle> triangles;
+  std::vector<MissedTarget> missed;  ///< ascending by point
   UniformCounts counts;
 };
 
