@@ -121,6 +121,8 @@ class Batch {
         lines_(session),
         jobs_(std::min<std::size_t>(std::size_t(files.jobs), items.size())) {
     words_.push_back(command.get_name());
+    if (const CLI::Option* units = command.get_option_no_throw("--units"); units && units->count() > 0)
+      unit_ = " " + units->as<std::string>();
     forward(command, words_);
     const int threads = session.threads.value_or(int(std::max(1u, std::thread::hardware_concurrency())));
     words_.push_back("--threads=" +
@@ -203,12 +205,13 @@ class Batch {
   }
 
   /// Prints the certified distance of `remesh --error` and `--triangles`, with its exceptions.
-  static void print_certified(const Json& line) {
+  void print_certified(const Json& line) const {
     const Json figures = line.value("figures", Json::object());
     if (!figures.contains("certified_to_polygons")) return;
     std::cout << "; certified within "
               << text(std::max(figures["certified_to_polygons"].get<double>(),
-                               figures["certified_from_polygons"].get<double>()));
+                               figures["certified_from_polygons"].get<double>()))
+              << unit_;
     if (figures.contains("hole_area")) std::cout << ", holes closed";
     if (const std::size_t balls = line["result"].value("exceptions", Json::array()).size(); balls > 0)
       std::cout << ", except in " << balls << (balls == 1 ? " ball" : " balls");
@@ -241,6 +244,7 @@ class Batch {
   std::size_t jobs_, done_ = 0, failed_ = 0, unmet_ = 0;
   double total_ = 0.0, bytes_done_ = 0.0;
   std::vector<std::string> words_;
+  std::string unit_;  ///< " mm", or empty if no unit is given
   std::map<std::size_t, std::unique_ptr<ChildRun>> running_;
 };
 

@@ -151,8 +151,10 @@ TEST_F(BatchTest, AProcessThatIsKilledIsOneFailure) {
 }
 
 TEST_F(BatchTest, StatesTheCertifiedDistanceOfEachFile) {
-  const Outcome outcome = run_to(0, "remesh cube.off s1.off --out-dir clean --error 0.1 --json near.jsonl");
+  const Outcome outcome =
+      run_to(0, "remesh cube.off s1.off --out-dir clean --error 0.1 --units mm --json near.jsonl");
   EXPECT_EQ(count(outcome.out, "; certified within "), 2u) << outcome.out;
+  EXPECT_EQ(count(outcome.out, " mm\n"), 2u) << outcome.out;
   for (const Json& line : lines("near.jsonl"))
     EXPECT_LE(line.at("figures").at("certified_to_polygons"), 0.1) << line;
   EXPECT_EQ(count(run_to(0, "remesh cube.off --out-dir clean --voxel-size 0.1").out, "certified"), 0u);
