@@ -276,8 +276,8 @@ class Pages:
             if isinstance(right, LabError):
                 found.append(f"{where}: {right}")
             elif begins_line(marker):
-                found.append(f"{where}: {marker['name']} begins a line, which Markdown takes for HTML that ends "
-                             "the paragraph; move a word before it")
+                found.append(f"{where}: {marker['name']} begins a line, which Markdown takes for HTML that "
+                             "ends the paragraph; move a word before it")
             elif marker["content"] != right:
                 is_short = len(marker["content"]) + len(right) < 200
                 differs = (f'is "{marker["content"]}", by the rows "{right}"' if is_short
