@@ -9,6 +9,7 @@ import os
 import pathlib
 import subprocess
 import sys
+import textwrap
 import tomllib
 
 from docutils import nodes
@@ -37,7 +38,8 @@ exclude_patterns = ["build", ".git", ".cache", "results/local", "**/node_modules
 
 html_theme = "furo"
 html_title = f"hermesh {version}"
-html_static_path = []
+html_static_path = ["_static"]
+html_css_files = ["site.css"]
 html_copy_source = False
 html_show_sphinx = False
 html_last_updated_fmt = None
@@ -62,6 +64,8 @@ class CommandHelp(Directive):
     """The help of all commands of the program, each in a section of its own."""
 
     def run(self):
+        # The page is read again after a change of the program.
+        self.state.document.settings.env.note_dependency(PROGRAM)
         # The width of the help does not depend on the terminal.
         environment = {**os.environ, "COLUMNS": "100"}
         text = lambda *words: subprocess.run([PROGRAM, *words, "--help"], check=True, capture_output=True,
@@ -77,6 +81,9 @@ class CommandHelp(Directive):
 
     @staticmethod
     def literal(text):
+        # The descriptions of options begin in column 30.
+        text = "\n".join("\n".join(textwrap.wrap(line, 118, subsequent_indent=" " * 30)) or line
+                         for line in text.splitlines())
         return nodes.literal_block(text, text, language="text")
 
 
@@ -84,7 +91,9 @@ class Columns(Directive):
     """A table of the columns of experiments/lab/columns.toml."""
 
     def run(self):
-        with open(ROOT / "experiments/lab/columns.toml", "rb") as file:
+        listed = ROOT / "experiments/lab/columns.toml"
+        self.state.document.settings.env.note_dependency(str(listed))
+        with open(listed, "rb") as file:
             columns = tomllib.load(file)["column"]
         table, group, body = nodes.table(), nodes.tgroup(cols=3), nodes.tbody()
         group += [nodes.colspec(colwidth=width) for width in (2, 2, 5)]

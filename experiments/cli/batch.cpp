@@ -13,6 +13,7 @@
 #include <set>
 #include <thread>
 
+#include "algorithms/core/number_text.h"
 #include "algorithms/core/shown.h"
 #include "experiments/cli/child_run.h"
 #include "experiments/cli/cli11.h"
@@ -120,6 +121,8 @@ class Batch {
         lines_(session),
         jobs_(std::min<std::size_t>(std::size_t(files.jobs), items.size())) {
     words_.push_back(command.get_name());
+    if (const CLI::Option* units = command.get_option_no_throw("--units"); units && units->count() > 0)
+      unit_ = " " + units->as<std::string>();
     forward(command, words_);
     const int threads = session.threads.value_or(int(std::max(1u, std::thread::hardware_concurrency())));
     words_.push_back("--threads=" +
@@ -129,18 +132,18 @@ class Batch {
   }
 
   int run() {
-    show_progress();
     for (std::size_t next = 0; next < items_.size() || !running_.empty();) {
       if (session_.context.cancelled()) stop();
       while (next < items_.size() && running_.size() < jobs_) start(next++);
       std::vector<ChildRun*> children;
       for (auto& [number, child] : running_) children.push_back(child.get());
       ChildRun::wait_for_any(children, 20);
-      std::erase_if(running_, [&](const auto& entry) {
+      const std::size_t ended = std::erase_if(running_, [&](const auto& entry) {
         if (!entry.second->has_ended()) return false;
         finish(items_[entry.first], *entry.second);
         return true;
       });
+      if (ended > 0) show_progress();
     }
     summarise();
     return failed_ > 0 ? kFailed : unmet_ > 0 ? kNotMet : kDone;
@@ -152,6 +155,7 @@ class Batch {
     words.push_back(items_[number].input);
     if (!items_[number].output.empty()) words.push_back(items_[number].output);
     running_.emplace(number, std::make_unique<ChildRun>("/proc/self/exe", words));
+    show_progress();
   }
 
   /// Ends all processes and waits for them. @throws Cancelled
@@ -170,7 +174,6 @@ class Batch {
     report(item, line);
     bytes_done_ += weight_of(item.input);
     ++done_;
-    show_progress();
   }
 
   /// Logs and prints the result of one input.
@@ -195,14 +198,33 @@ class Batch {
       for (const Json& message : line["result"].value(key, Json::array()))
         std::cout << before << message.get<std::string>();
     };
+    print_certified(line);
     print_each("sentences", "; ");
     print_each("unmet_requirements", "; required but not met: ");
     std::cout << std::endl;
   }
 
+  /// Prints the certified distance of `remesh --error` and `--triangles`, with its exceptions.
+  void print_certified(const Json& line) const {
+    const Json figures = line.value("figures", Json::object());
+    if (!figures.contains("certified_to_polygons")) return;
+    std::cout << "; certified within "
+              << text(std::max(figures["certified_to_polygons"].get<double>(),
+                               figures["certified_from_polygons"].get<double>()))
+              << unit_;
+    if (figures.contains("hole_area")) std::cout << ", holes closed";
+    if (const std::size_t balls = line["result"].value("exceptions", Json::array()).size(); balls > 0)
+      std::cout << ", except in " << balls << (balls == 1 ? " ball" : " balls");
+  }
+
+  /// Reports the number of finished files, and the name of the one that has been processed longest.
   void show_progress() {
-    session_.context.progress(std::to_string(done_) + " of " + std::to_string(items_.size()) + " files",
-                              bytes_done_ / total_);
+    std::string stage = std::to_string(done_) + " of " + std::to_string(items_.size()) + " files";
+    if (!running_.empty())
+      stage +=
+          ", now " + shown(fs::path(items_[running_.begin()->first].input).filename().string(), 60, true);
+    if (running_.size() > 1) stage += " and " + std::to_string(running_.size() - 1) + " more";
+    session_.context.progress(stage, bytes_done_ / total_);
   }
 
   void summarise() {
@@ -222,6 +244,7 @@ class Batch {
   std::size_t jobs_, done_ = 0, failed_ = 0, unmet_ = 0;
   double total_ = 0.0, bytes_done_ = 0.0;
   std::vector<std::string> words_;
+  std::string unit_;  ///< " mm", or empty if no unit is given
   std::map<std::size_t, std::unique_ptr<ChildRun>> running_;
 };
 

@@ -150,6 +150,16 @@ TEST_F(BatchTest, AProcessThatIsKilledIsOneFailure) {
   EXPECT_EQ(all[0].at("output"), "clean/s1.ply");
 }
 
+TEST_F(BatchTest, StatesTheCertifiedDistanceOfEachFile) {
+  const Outcome outcome =
+      run_to(0, "remesh cube.off s1.off --out-dir clean --error 0.1 --units mm --json near.jsonl");
+  EXPECT_EQ(count(outcome.out, "; certified within "), 2u) << outcome.out;
+  EXPECT_EQ(count(outcome.out, " mm\n"), 2u) << outcome.out;
+  for (const Json& line : lines("near.jsonl"))
+    EXPECT_LE(line.at("figures").at("certified_to_polygons"), 0.1) << line;
+  EXPECT_EQ(count(run_to(0, "remesh cube.off --out-dir clean --voxel-size 0.1").out, "certified"), 0u);
+}
+
 TEST_F(BatchTest, IsQuietAndLogged) {
   const Outcome outcome = run("remesh s1.off bad1.ply --out-dir clean --voxel-size 0.2 --quiet --log log");
   EXPECT_EQ(outcome.out, "");

@@ -108,9 +108,10 @@ CLI::App* add_voxelize_options(CLI::App& command, VoxelizeArguments& arguments, 
                      "Name of the voxelizer, see hermesh list (default: " + arguments.voxelizer + ")");
   command.add_option(
       "--signs", arguments.signs,
-      "How the voxelizer hermesh finds the inside: auto (default), flood-fill, winding-number (default of "
-      "remesh --error and --triangles), or unsigned for none; with --thin keep the default is auto-sheets, "
-      "i.e. auto without closing large holes; short for --voxelizer-option signs=...");
+      "How the voxelizer hermesh finds the inside: flood-fill, winding-number, auto (flood-fill, or "
+      "winding-number if the flood leaks), auto-sheets (auto without closing large holes), or unsigned for "
+      "none. Default: winding-number with --error and --triangles, auto-sheets with --thin keep, else auto; "
+      "short for --voxelizer-option signs=...");
   command
       .add_option("--thin", arguments.thin,
                   "Walls, wires and open sheets thinner than the voxels: keep (default) thickens them until "

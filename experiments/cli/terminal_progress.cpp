@@ -128,9 +128,10 @@ double OverallProgress::update(std::string_view stage, double fraction) {
   return done_ = std::max(done_, base_ + span_ * fraction);
 }
 
-std::optional<double> OverallProgress::left(double done, double elapsed) {
+std::optional<double> OverallProgress::left(double done, double elapsed, double silence) {
   if (done < 0.02 || elapsed < 1.0) return std::nullopt;
-  return elapsed * (1.0 - done) / done;
+  const double left = elapsed * (1.0 - done) / done - silence;
+  return left < 0.0 ? std::nullopt : std::optional(left);
 }
 
 std::string duration_text(double seconds) {
@@ -165,7 +166,7 @@ void TerminalProgress::show(std::string_view stage, double fraction) {
   if (now < next_ && stage == stage_) return;
   const std::lock_guard lock(terminal().mutex);
   if (stage != stage_) stage_ = stage, stage_start_ = now;
-  fraction_ = fraction;
+  if (fraction != fraction_) fraction_ = fraction, fraction_time_ = now;
   if (now < next_) return;
   next_ = now + 100ms;
   if (is_terminal_) write_line(now, "");
@@ -175,8 +176,10 @@ std::string TerminalProgress::text(Clock::time_point now) const {
   char percent[16];
   std::snprintf(percent, sizeof percent, " %3.0f %%", 100.0 * std::clamp(fraction_, 0.0, 1.0));
   if (!overall_) return stage_.substr(0, kLongestStage) + percent;
-  const std::chrono::duration<double> elapsed = now - start_, of_stage = now - stage_start_;
-  auto left = OverallProgress::left(fraction_, elapsed.count());
+  // The estimate is that of the last progress, so that it counts down while a stage reports nothing.
+  const std::chrono::duration<double> elapsed = fraction_time_ - start_, silence = now - fraction_time_,
+                                      of_stage = now - stage_start_;
+  auto left = OverallProgress::left(fraction_, elapsed.count(), silence.count());
   // A stage that takes longer than the estimate of all disproves it.
   if (left && of_stage.count() > 2.0 * *left + 5.0) left.reset();
   return std::string(percent + 1) + (left ? ", " + duration_text(*left) + " left" : "") + ": " + stage_;

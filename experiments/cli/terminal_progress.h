@@ -35,9 +35,10 @@ class OverallProgress {
   /// 0.
   double update(std::string_view stage, double fraction);
 
-  /// Returns the seconds until the end, or none before a second and a fiftieth of the work. `elapsed` is in
-  /// seconds.
-  static std::optional<double> left(double done, double elapsed);
+  /// Returns the seconds until the end, or none before a second and a fiftieth of the work. `elapsed` is the
+  /// time until `done` was reached and `silence` the time since, in seconds; a silence that is longer than
+  /// the estimate disproves it.
+  static std::optional<double> left(double done, double elapsed, double silence = 0.0);
 
  private:
   void begin(std::string_view stage);
@@ -83,7 +84,7 @@ class TerminalProgress {
   // Read by the thread, and written only under the lock of the terminal.
   std::string stage_;
   double fraction_ = 0.0;
-  Clock::time_point stage_start_ = {};
+  Clock::time_point stage_start_ = {}, fraction_time_ = start_;
   std::jthread thread_;
 };
 

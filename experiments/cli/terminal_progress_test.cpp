@@ -72,6 +72,8 @@ TEST(OverallProgress, TellsWhatIsLeft) {
   EXPECT_FALSE(OverallProgress::left(0.5, 0.5)) << "too early to tell";
   EXPECT_FALSE(OverallProgress::left(0.01, 100.0));
   EXPECT_DOUBLE_EQ(*OverallProgress::left(0.25, 10.0), 30.0);
+  EXPECT_DOUBLE_EQ(*OverallProgress::left(0.25, 10.0, 12.0), 18.0) << "counts down";
+  EXPECT_FALSE(OverallProgress::left(0.25, 10.0, 31.0)) << "longer than the estimate";
   EXPECT_EQ(duration_text(1.2), "2 s");
   EXPECT_EQ(duration_text(150.0), "3 min");
   EXPECT_EQ(duration_text(7.5 * 3600), "7 h 30 min");

@@ -22,6 +22,15 @@ struct Cell {
   std::optional<Timing> timing;     ///< absent when the variant failed
 };
 
+/// Returns the verdict on guarantees in the words of the tables, e.g. "guarantees closed, oriented:
+/// verified".
+std::string caption_of(std::string verdict) {
+  constexpr std::string_view kBefore = "promises ", kAfter = ": kept";
+  if (verdict.starts_with(kBefore)) verdict.replace(0, kBefore.size(), "guarantees ");
+  if (verdict.ends_with(kAfter)) verdict.replace(verdict.size() - kAfter.size(), kAfter.size(), ": verified");
+  return verdict;
+}
+
 std::optional<double> figure(const RunContext& child, std::string_view name) {
   for (const auto& [key, value] : child.figures)
     if (key == name) return value;
@@ -248,7 +257,7 @@ class Group {
         captions.push_back("rms from input " +
                            readable(rows[i]["report"]["from_reference"]["rms"].get<double>() / voxel_size_) +
                            " voxel");
-      captions.push_back(rows[i]["promise_verdict"]);
+      captions.push_back(caption_of(rows[i]["promise_verdict"]));
       sheet.pictures.push_back({rows[i]["variant"]["label"], captions, [this, i] {
                                   RunContext child = child_context(context_, false);
                                   const auto& file = cells_[i].mesh_file;

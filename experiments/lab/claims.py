@@ -253,9 +253,9 @@ def _rule_text(claim, judged):
 
 
 def list_of_values(values):
-    """Returns the values of a claim for a reader: "4.17", or "points 3, faces 1"."""
-    texts = [(name, _value_text(value)) for name, value in values.items()]
-    return texts[0][1] if len(texts) == 1 else ", ".join(f"{name} {text}" for name, text in texts)
+    """Returns the values of a claim for a reader: "4.17", or "open edges: 3, models: 1"."""
+    texts = [(name.replace("_", " "), _value_text(value)) for name, value in values.items()]
+    return texts[0][1] if len(texts) == 1 else ", ".join(f"{name}: {text}" for name, text in texts)
 
 
 def _value_text(value):

@@ -27,7 +27,7 @@ def run(arguments):
     for each in experiments:
         print(f"  {each['name']:<23} {each['question']}")
         if each["shows"]:
-            print(f"  {'':<23} also called {', '.join(each['shows'])}")
+            print(f"  {'':<23} makes {', '.join(each['shows'])}")
     print("\ncases (inputs that experiments name); the files of a private case have no public source: without "
           "them in $HERMESH_DATA, a stand-in of the same size replaces it")
     for case in cases():

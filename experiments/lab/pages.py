@@ -131,6 +131,12 @@ def markers(text, page):
     return found
 
 
+def begins_line(marker):
+    """Returns true if the marker of a number is the first of a line."""
+    before = marker.string[:marker.start()].rpartition("\n")[2]
+    return not before.strip() and "\n" not in marker["content"]
+
+
 def line_of(text, at):
     return text.count("\n", 0, at) + 1
 
@@ -261,14 +267,17 @@ class Pages:
         return result + text[done:]
 
     def problems_of(self, page):
-        """Returns a sentence for each marker of a page that differs from the rows, and for each number
-        without one.
+        """Returns a sentence for each marker of a page that differs from the rows or begins a line, and for
+        each number without one.
         """
         text, contents = self._contents(page)
         found = []
         for marker, where, right in contents:
             if isinstance(right, LabError):
                 found.append(f"{where}: {right}")
+            elif begins_line(marker):
+                found.append(f"{where}: {marker['name']} begins a line, which Markdown takes for HTML that "
+                             "ends the paragraph; move a word before it")
             elif marker["content"] != right:
                 is_short = len(marker["content"]) + len(right) < 200
                 differs = (f'is "{marker["content"]}", by the rows "{right}"' if is_short

@@ -46,7 +46,8 @@ def escaped(text):
         if letter not in SYMBOLS and ord(letter) > 126:
             raise LabError(f'there is no LaTeX for the character {letter!r} of "{text}"; add it to '
                            f'lab/paper.py')
-    return text.translate(str.maketrans(SYMBOLS))
+    # Two hyphens, e.g. of an option, would become a dash.
+    return "-{}-".join(part.translate(str.maketrans(SYMBOLS)) for part in text.split("--"))
 
 
 def formatted(value, form=""):
@@ -290,9 +291,9 @@ class Paper:
         for effect in (effect for effects in self.effects for effect in effects[:most]):
             column = effect["column"] + (", −" if effect["measure"] == "difference" else ", ÷")
             size = f"{effect['effect']} ({effect['95 % interval']})"
-            lines.append([escaped(cell)
-                          for cell in (effect["factor"], effect["level"], effect["against"], column, size,
-                                                     effect["predicted"], effect["verdict"])])
+            cells = (effect["factor"], effect["level"], effect["against"], column.replace("_", " "),
+                     size, effect["predicted"], effect["verdict"])
+            lines.append([escaped(re.sub(r"(?<![\w.])-(?=\d)", "−", cell)) for cell in cells])
         return tabular(paragraphs(0.2, 0.13, 0.1, 0.14, 0.15, 0.09, 0.08), lines, changes(lines))
 
     def table_of_claims(self, ids):
@@ -303,8 +304,7 @@ class Paper:
                 raise LabError(f"the claim {each} is not contradicted")
             claim, judged = by_id[each]
             place = re.split(";|, figure|, implied", claim.place)[0]
-            values = {name.replace("_", " "): value for name, value in judged.values.items()}
-            ours = claims.list_of_values(values) or "a test shows the contrary"
+            ours = claims.list_of_values(judged.values) or "a test shows the contrary"
             lines.append([escaped(place[0].upper() + place[1:]), escaped(claim.says), escaped(ours)])
         return tabular(paragraphs(0.12, 0.46, 0.36), lines)
 

@@ -18,6 +18,7 @@ STATED = [
     (".zenodo.json", r'"version": "([^"]*)"', r'"publication_date": "([^"]*)"'),
     ("CHANGELOG.md", r"^## (\S+), .*$", r"^## \S+, (\S+)$"),
     ("packages/debian/changelog", r"^hermesh \((.*)-\d+\)", r"^ -- .*>  \w+, (\d+ \w+ \d+) "),
+    ("docs/tutorials/reproduce_and_cite.md", r"^ *version = \{(\S+)\}", ""),
     ("packages/python/README.md", r"hermesh-(\d[\d.]*\d)-\*\.whl", ""),
 ]
 # Repeated in every file that archives and indices read.

@@ -69,6 +69,13 @@ class Filling(PagesCase):
         self.assertIn("*time [s]*", self.filled("<!--=legend race--><!--/-->"))
         self.assertIn("| one | table 1 | It says. | 4 | 4.17 |", self.filled("<!--=claims--><!--/-->"))
 
+    def test_a_number_does_not_begin_a_line(self):
+        for text in ("<!--=speed-->4<!--/--> times\n", "It is\n  <!--=speed-->4<!--/--> times\n"):
+            self.filled(text)
+            self.assert_one_problem("speed begins a line")
+        self.filled("It is <!--=speed-->4<!--/-->\n\n<!--=all--><!--/-->\n")
+        self.assertEqual(self.problems(), [])
+
     def test_wrong_markers_are_named(self):
         for text, words in (("<!--=speed-->4\n", "page.md:1: .*no end"),
                             ("<!--=speed-->4 <!--=all--><!--/-->", "page.md:1: "),
@@ -95,7 +102,7 @@ class Filling(PagesCase):
 class Checking(PagesCase):
     def setUp(self):
         super().setUp()
-        self.filled("<!--=speed-->?<!--/-->\n<!--=table race ball 40-->\n<!--/-->\n")
+        self.filled("It is <!--=speed-->?<!--/-->\n<!--=table race ball 40-->\n<!--/-->\n")
 
     def test_every_digit_that_is_edited_is_found(self):
         self.assertEqual(self.problems(), [])

@@ -157,6 +157,7 @@ class Text(unittest.TestCase):
 
     def test_values_are_written_for_latex(self):
         self.assertEqual(paper.escaped("a_b 5 % ∪ Δ ∅"), "a\\_b 5 \\% $\\cup$ $\\Delta$ $\\emptyset$")
+        self.assertEqual(paper.escaped("--thin, 2–3"), "-{}-thin, 2--3")
         self.assertRaises(LabError, paper.escaped, "\u4e00")
         self.assertEqual(paper.formatted(1.9e-6), "$1.9\\cdot10^{-6}$")
         self.assertEqual(paper.formatted(-5.8), "$-$5.8")
