@@ -31,8 +31,8 @@ include_patterns = [
     "docs/**", "README.md", "ARCHITECTURE.md", "CONTRIBUTING.md", "CHANGELOG.md", "CODE_OF_CONDUCT.md",
     "SECURITY.md", "algorithms/*/README.md", "validation/README.md", "reference/peers/README.md",
     "experiments/cli/*.md", "experiments/lab/*.md", "experiments/questions/README.md",
-    "experiments/sweep/README.md", "packages/*/README.md", "paper/README.md", "paper/claims.md",
-    "paper/readings.md", "paper/ablations.md", "results/README.md"
+    "experiments/sweep/README.md", "experiments/fuzzing/README.md", "packages/*/README.md",
+    "paper/README.md", "paper/claims.md", "paper/readings.md", "paper/ablations.md", "results/README.md"
 ]
 exclude_patterns = ["build", ".git", ".cache", "results/local", "**/node_modules", "docs/README.md"]
 

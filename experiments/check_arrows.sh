@@ -30,6 +30,7 @@ find algorithms reference validation packages/cpp experiments -name node_modules
       may["experiments/measurements"] = may["experiments/accuracy"] " experiments/accuracy experiments/ablations experiments/fracture"
       may["experiments/cells"] = may["experiments/measurements"] " experiments/measurements"
       may["experiments/cli"] = "experiments/stages experiments/fracture"
+      may["experiments/fuzzing"] = "experiments/cli experiments/harness"
     }
     function room(path,    part) {
       split(path, part, "/")

@@ -61,11 +61,15 @@ class PlaceTree {
     while (node /= 2) boxes_[node] = boxes_[2 * node].merged(boxes_[2 * node + 1]);
   }
 
+  /// Returns the number of leaves of the tree that all calls of any_in() have visited, and of these calls.
+  std::uint64_t visited() const { return visited_; }
+
   /// Returns true if f(corner) holds for a chosen corner in the counter-clockwise triangle abc, boundary
   /// included.
   template <class F>
   bool any_in(const Vector2d& a, const Vector2d& b, const Vector2d& c, F&& f) const {
     Eigen::AlignedBox2d box(a, a);
+    ++visited_;
     return any_in(1, 0, order_.size(), box.extend(b).extend(c), a, b, c, f);
   }
 
@@ -94,6 +98,7 @@ class PlaceTree {
     if (!here.intersects(box) || is_right_of(a, b, here) || is_right_of(b, c, here) ||
         is_right_of(c, a, here))
       return false;
+    visited_ += end - begin <= kLeaf;
     if (end - begin <= kLeaf)
       return std::any_of(
           order_.begin() + std::ptrdiff_t(begin), order_.begin() + std::ptrdiff_t(end), [&](std::uint32_t i) {
@@ -119,6 +124,7 @@ class PlaceTree {
   std::vector<char> chosen_;
   std::vector<Eigen::AlignedBox2d>
       boxes_;  ///< of the chosen positions of each node; children of i: 2i and 2i + 1
+  mutable std::uint64_t visited_ = 0;
 };
 
 /// Set of corners that are still to be tested.
@@ -165,7 +171,7 @@ class Ring {
         context.progress("concave polygons", double(cut_off_) / double(places_.size()));
       }
       const std::optional<std::uint32_t> corner = next_to_cut(at, context);
-      if (!corner) return {};
+      if (!corner || is_too_slow()) return {};
       triangles.push_back({before_[*corner], *corner, next_[*corner]});
       // The direct neighbour would make a fan of slivers.
       at = next_[cut(*corner)];
@@ -230,7 +236,12 @@ class Ring {
     }
   }
 
+  /// Returns true after more work than polygons of distinct points take, which is about ten visits for each
+  /// corner: corners at one position are all tested for each ear there, which takes quadratic time.
+  bool is_too_slow() const { return reflex_.visited() > 10'000'000 + 100 * places_.size(); }
+
   bool is_ear(std::uint32_t at) const {
+    if (is_too_slow()) return false;
     // A straight corner gives a triangle without area; next_to_cut() cuts one only if the polygon has no ear.
     if (area_at(at) <= 0) return false;
     const Vector2d &a = places_[before_[at]], &b = places_[at], &c = places_[next_[at]];

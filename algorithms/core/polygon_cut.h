@@ -18,8 +18,9 @@ bool is_fan(std::span<const Eigen::Vector3d> corners);
 /// Triangulates a polygon by ear clipping (Meisters 1975). Returns n − 2 triangles of corner indices that
 /// cover it once, seen along its mean normal. Collinear corners are allowed, and so is a boundary that
 /// touches itself at points or passes twice along a bridge to a hole. Returns an empty vector if no ear is
-/// found, e.g. because the boundary intersects itself. A polygon of a hundred thousand corners takes a few
-/// tenths of a second. @throws Cancelled.
+/// found, e.g. because the boundary intersects itself, and if many corners repeat the same points, which would
+/// take quadratic time. A polygon of a hundred thousand corners takes a few tenths of a second. @throws
+/// Cancelled.
 std::vector<Triangle> clip_ears(std::span<const Eigen::Vector3d> corners, const RunContext& context);
 
 }  // namespace hermesh

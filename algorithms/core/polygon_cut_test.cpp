@@ -128,6 +128,23 @@ TEST(ClipEars, NoneOfABorderThatCrossesItself) {
   EXPECT_TRUE(clip_ears(flat({{0, 0}, {4, 0}, {0, 4}, {4, 4}, {1, -2}, {3, 9}}), RunContext()).empty());
 }
 
+/// Returns triangles that meet in one point, with gaps between them.
+Polygon petals(int count) {
+  Polygon polygon;
+  for (int i = 0; i < count; ++i) {
+    const double angle = 2 * std::numbers::pi / count;
+    polygon.emplace_back(0, 0, 0);
+    polygon.emplace_back(std::cos(i * angle), std::sin(i * angle), 0);
+    polygon.emplace_back(std::cos((i + 0.4) * angle), std::sin((i + 0.4) * angle), 0);
+  }
+  return polygon;
+}
+
+TEST(ClipEars, NoneOfManyCornersAtOnePointWhichWouldTakeQuadraticTime) {
+  expect_cover(petals(100), Vector3d(0, 0, 50 * std::sin(0.4 * 2 * std::numbers::pi / 100)));
+  EXPECT_TRUE(clip_ears(petals(20'000), RunContext()).empty());
+}
+
 /// Seen as a whole from a point inside, so that the area is a sum.
 TEST(ClipEars, RandomStarsInRandomPlanes) {
   std::mt19937 random(3);

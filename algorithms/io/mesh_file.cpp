@@ -191,7 +191,10 @@ void MeshBuilder::cut_concave_polygons() {
     if (attributes_ && !cut.empty()) attributes_->cut_polygon(fan.polygon, std::move(cut));
   }
   if (left > 0)
-    note(left, " concave polygons intersect themselves; they were cut into fans, which may cover more");
+    note(left,
+         " concave polygons intersect themselves or repeat points too often; they were cut into fans, which "
+         "may "
+         "cover more");
 }
 
 void MeshBuilder::add_comment(std::string_view text) {

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstring>
 #include <fstream>
 
 #include "algorithms/core/level_set_grid.h"
@@ -121,6 +122,24 @@ void check_transform(const openvdb::math::Transform& transform, const std::strin
   }
 }
 
+/// Returns true if the background and all tiles of a grid of bools are 0 or 1 in memory, and for other grids.
+/// OpenVDB copies their bytes from the file; using another byte as a bool is undefined.
+bool has_valid_truths(const openvdb::GridBase& grid) {
+  bool valid = true;
+  const auto check = [&](const bool& value) {
+    unsigned char byte = 0;
+    std::memcpy(&byte, &value, sizeof byte);
+    valid = valid && byte <= 1;
+  };
+  grid.apply<openvdb::TypeList<openvdb::BoolGrid, openvdb::MaskGrid>>([&](const auto& truths) {
+    check(truths.background());
+    auto tile = truths.cbeginValueAll();
+    tile.setMaxDepth(tile.getLeafDepth() - 1);
+    for (; tile; ++tile) check(tile.getValue());
+  });
+  return valid;
+}
+
 }  // namespace
 
 VdbReader::VdbReader(const fs::path& path) : path_(path), file_(path.string()) {
@@ -171,7 +190,11 @@ openvdb::GridBase::Ptr VdbReader::read(const std::string& name) {
   double bytes = 0.0;
   for (const VdbDescriptor* grid : found(name)) bytes = std::max(bytes, structure_->check_tree(*grid));
   check_fits_memory(bytes, path_.string() + ": the grid '" + shown(name) + "'");
-  return with_good_transform(name, file_.readGrid(name));
+  const openvdb::GridBase::Ptr grid = file_.readGrid(name);
+  if (!has_valid_truths(*grid))
+    throw Error(path_.string() + " is damaged: a truth value of the grid '" + shown(name) +
+                "' is neither true nor false");
+  return with_good_transform(name, grid);
 }
 
 openvdb::GridBase::Ptr VdbReader::read_metadata(const std::string& name) {

@@ -56,9 +56,8 @@ std::vector<std::vector<double>> mesh_distances(const LoadedCase& input,
   return all;
 }
 
-void work_on(const Json& job, const Tables& tables, RunContext& context) {
-  const std::string kind = job.at("kind");
-  const std::filesystem::path out = job.value("out", "");
+void work_on(const AnyJob& any, const Tables& tables, RunContext& context) {
+  const auto& [job, kind, threads, data, out] = any;
   if (kind == "input") {
     send({{"input", case_json(load_input(job.at("case"), read_change(job), tables, context))}});
   } else if (kind == "measurement") {
@@ -114,9 +113,7 @@ Tables all_tables() {
 void serve_job(const Tables& tables, RunContext& context) {
   std::string line;
   std::getline(std::cin, line);
-  const Json job = Json::parse(line, nullptr, false);
-  if (!job.is_object())
-    throw Error("expected a job on the standard input; `hermesh run` starts this program");
+  const AnyJob job = read_job(line);
   auto next = std::chrono::steady_clock::now();
   context.on_progress = [&](std::string_view stage, double fraction) {
     using namespace std::chrono_literals;
@@ -125,10 +122,9 @@ void serve_job(const Tables& tables, RunContext& context) {
     next = now + 100ms;
     send({{"stage", stage}, {"fraction", fraction}});
   };
-  const tbb::global_control limit(tbb::global_control::max_allowed_parallelism,
-                                  job.at("threads").get<std::size_t>());
+  const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, job.threads);
   try {
-    require_data(job.at("require_data").get<bool>());
+    require_data(job.require_data);
     work_on(job, tables, context);
     for (const std::string& note : context.notes) send({{"note", note}});
     context.notes.clear();

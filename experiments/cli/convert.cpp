@@ -384,10 +384,11 @@ void place_within_shell(ExtractorArguments& extracting, double thickness_in_voxe
   if (reach >= 1.0) return;
   for (const auto& [name, value] : {std::pair<std::string, std::string>("reach", text(reach)),
                                     std::pair<std::string, std::string>("truncation", kShellTruncation)}) {
+    const std::string& key = name;  // clang 14 captures no structured bindings
     const auto is_given = [&](const std::string& option) {
-      return option.starts_with(name + "=") || option.starts_with("placement=");
+      return option.starts_with(key + "=") || option.starts_with("placement=");
     };
-    const auto is_known = [&](const OptionSpec& option) { return option.name == name; };
+    const auto is_known = [&](const OptionSpec& option) { return option.name == key; };
     if (std::ranges::none_of(extracting.options, is_given) &&
         std::ranges::any_of(extracting.chosen.extractor.options, is_known))
       extracting.options.push_back(name + "=" + value);

@@ -14,11 +14,9 @@
 #include <new>
 
 #include "algorithms/core/shown.h"
-#include "algorithms/io/mesh_file.h"
 #include "algorithms/thesis/voxels/dense_hermite.h"
 #include "experiments/cli/cli11.h"
-#include "experiments/cli/help.h"
-#include "experiments/cli/laboratory.h"
+#include "experiments/cli/command_line.h"
 #include "experiments/cli/signals.h"
 #include "experiments/cli/streams.h"
 #include "experiments/cli/terminal_progress.h"
@@ -182,48 +180,6 @@ int run_to_exit_code(Session& session, CommandFiles* files) {
   }
 }
 
-/// Returns the name of an option whose value is an empty string, as an unset variable of a script leaves it;
-/// it would be taken for a missing option. Empty if there is no such option.
-std::string option_without_value(const CLI::App& app) {
-  for (const CLI::Option* option : app.get_options())
-    for (const std::string& given : option->results())
-      if (given.empty()) return option->get_name();
-  const auto all = [](const CLI::App*) { return true; };  // groups of options are commands, too
-  for (const CLI::App* command : app.get_subcommands(all))
-    if (const std::string found = option_without_value(*command); !found.empty()) return found;
-  return {};
-}
-
-/// Returns a message about a word after --json that is meant as its file but would be an input because of its
-/// ending; empty if there is none.
-std::string misnamed_json_file(const std::vector<std::string>& words) {
-  const auto at = std::ranges::find(words, "--json");
-  if (at == words.end() || at + 1 == words.end()) return {};
-  const std::filesystem::path word = *(at + 1);
-  const std::string ending = word.extension().string();
-  if (word.string().starts_with('-') || ending.empty() || is_mesh_path(word)) return {};
-  // No command reads or writes files with these endings; a file that does not exist is not an input, but may
-  // be an output.
-  const bool is_report = ending == ".txt" || ending == ".log" || ending == ".csv";
-  const auto endings = {".json", ".jsonl", ".vdb", ".nii", ".raw", ".gz", ".toml"};
-  const bool is_ours = std::ranges::find(endings, ending) != endings.end();
-  std::error_code error;
-  if (is_ours || (!is_report && std::filesystem::exists(word, error))) return {};
-  return "--json takes the next word as its file only if that ends in .json or .jsonl, and '" +
-         word.string() + "' would be an input: write --json='" + word.string() + "' if it is the file";
-}
-
-/// Returns the arguments in the order that CLI11 expects, the last one first. The file of --json is attached
-/// to it, because a flag takes no separate value; no file that a command reads or writes has that extension.
-std::vector<std::string> with_json_files(std::vector<std::string> words) {
-  for (std::size_t i = 0; i + 1 < words.size(); ++i)
-    if (words[i] == "--json" && (words[i + 1].ends_with(".json") || words[i + 1].ends_with(".jsonl"))) {
-      words[i] += "=" + words[i + 1];
-      words.erase(words.begin() + std::ptrdiff_t(i) + 1);
-    }
-  return {words.rbegin(), words.rend()};
-}
-
 int run_program(int argc, char** argv) {
   Session session;
   session.context.cancel = &handle_signals();
@@ -233,40 +189,14 @@ int run_program(int argc, char** argv) {
       "--version", [] { return "hermesh " HERMESH_VERSION "\n" + build_text(); },
       "Print the version and the build facts, and exit");
   app.set_help_flag("--help,-h", "Print this help and exit");
-  add_common_options(app, session);
-  add_list(app, session);
-  add_voxelize(app, session);
-  add_import(app, session);
-  add_conversions(app, session);
-  add_combine(app, session);
-  add_fracture(app, session);
-  add_validate(app, session);
-  add_info(app, session);
-  add_laboratory(app, session);
-  add_help(app, session);
-  const auto refuse = [](const std::string& message) {
-    return fail(kUsage, message + "; see hermesh --help");
-  };
-  const std::vector<std::string> words(argv + 1, argv + argc);
-  if (const std::string message = misnamed_json_file(words); !message.empty()) return refuse(message);
-  for (const std::string& word : words)
-    session.command_line += (session.command_line.empty() ? "" : " ") + word;
+  add_commands(app, session);
   CommandFiles* files = nullptr;
   try {
-    app.parse(with_json_files(words));
-    if (const std::string option = option_without_value(app); !option.empty())
-      return refuse(option + " was given an empty value");
-    if (!session.command) return refuse("a command is missing");
-    files = files_of_command(app, session);
-    check_written_files(app, files, session);
-  } catch (const CLI::ParseError& error) {
-    if (error.get_exit_code() == 0) return app.exit(error);
-    std::string message = unknown_word(app, words);
-    if (message.empty() && dynamic_cast<const CLI::RequiredError*>(&error))
-      message = missing_output(app, session);
-    return refuse(message.empty() ? error.what() : message);
+    files = parse_command_line(app, session, {argv + 1, argv + argc});
+  } catch (const CLI::Success& help) {
+    return app.exit(help);
   } catch (const UsageError& error) {
-    return refuse(error.what());
+    return fail(kUsage, std::string(error.what()) + "; see hermesh --help");
   }
 
   // Without a limit TBB uses the whole machine, and an experiment may request more.

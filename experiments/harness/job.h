@@ -7,6 +7,7 @@
 #include <map>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "algorithms/core/variant.h"
@@ -73,11 +74,24 @@ struct GroupJob {
   std::string files;               ///< name of the files: NAME.png and meshes/EXPERIMENT-NAME/
 };
 
+/// The keys that all jobs of the laboratory have (cells/serve.h).
+struct AnyJob {
+  Json json;
+  std::string kind;
+  std::size_t threads = 1;
+  bool require_data = false;
+  std::filesystem::path out;
+};
+
+/// Reads the keys of any job. @throws Error for text that is not a JSON object, or is nested too deeply to be
+/// copied, and as read_group_job().
+AnyJob read_job(std::string_view line);
+
 /// Reads the key "sweep" of a job. @throws as read_group_job().
 std::optional<ChangedParameter> read_change(const Json& job);
 
-/// Reads a job of the laboratory (cells/serve.h). @throws nlohmann::json::exception for a missing key or a
-/// wrong type.
+/// Reads a job of the kinds extraction and voxelization. @throws Error that names the key if it is missing,
+/// or if its value has a wrong type or is out of range.
 GroupJob read_group_job(const Json& job);
 
 /// The variants, cases and measurements that a job may name. Tests put toys here.

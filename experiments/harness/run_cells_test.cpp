@@ -277,6 +277,7 @@ TEST(GroupJobs, AreReadFromCompleteJson) {
 }
 
 TEST(GroupJobs, KeysAreRequiredExceptThoseThatMayBeNull) {
+  // Either a resolution or a voxel size is required.
   const std::set<std::string> nullable = {"resolution", "voxel_size", "length",  "published_seconds",
                                           "distances",  "features",   "closeup", "view"};
   const Json full = full_job();
@@ -286,7 +287,7 @@ TEST(GroupJobs, KeysAreRequiredExceptThoseThatMayBeNull) {
     if (nullable.contains(key))
       EXPECT_NO_THROW(read_group_job(job)) << key;
     else
-      EXPECT_THROW(read_group_job(job), nlohmann::json::exception) << key;
+      EXPECT_THROW(read_group_job(job), Error) << key;
   }
   Json job = full;
   job["signs"] = "majority";

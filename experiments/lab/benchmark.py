@@ -42,12 +42,12 @@ import pathlib
 import signal
 import sys
 import tempfile
-import tomllib
 
 import numpy
 
 from . import child, corpus, polygons, protocol, rates
-from .rows import ROOT, LabError, append_rows, drop_torn_row
+from .experiment import choice, flag, list_of, number, parse, read_table, text
+from .rows import ROOT, LabError, append_rows, drop_torn_row, shown
 
 FEW_HOLES = 0.02  # share of boundary edges among all edges
 FLAT = 1e-6  # thickness over length
@@ -57,33 +57,80 @@ VALIDATION = child.Limits(seconds=600, memory_mib=16_384)
 PLANES = 3  # that cut a solid to fracture
 DEFECTS = ("boundary_edges", "non_manifold_edges", "non_manifold_vertices", "inconsistent_edges",
            "inside_out_components", "self_intersecting_pairs")
-REQUIRED = {"question", "corpus", "models", "seed", "resolution", "seconds", "memory_mib", "method"}
-OPTIONAL = {"sample", "error", "threads", "task", "classes"}
+PLACEHOLDERS = ("hermesh input output second operation planes resolution voxel voxel_size error seed threads "
+                "version task result seconds memory_mib").split()  # in the words of a method
 
 
-def _read_with_base(path):
-    experiment = tomllib.loads(path.read_text())
-    if "base" not in experiment:
-        return experiment
-    base, own = _read_with_base(path.parent / experiment.pop("base")), experiment.get("method", [])
-    names = {method["name"] for method in own} | set(experiment.pop("without", []))
-    own += [method for method in base.get("method", []) if method["name"] not in names]
-    return {**base, **experiment, "method": own}
+def _words(value, where):
+    """Checks the words of a command, in which names in braces are replaced."""
+    words = list_of(text)(value, where)
+    for word in words:
+        try:
+            word.format(**dict.fromkeys(PLACEHOLDERS, 1.0))
+        except (LookupError, ValueError, AttributeError, TypeError):
+            raise LabError(f"{where}: '{shown(word)}' has unknown words in braces; expected {{hermesh}}, "
+                           "{input}, {output}, {second}, {operation}, {planes}, {resolution}, {voxel}, "
+                           "{error}, {seed} or {threads}") from None
+    return words
+
+
+def _claims(value, where):
+    checks = dict.fromkeys(protocol.CLAIMS, flag) | dict.fromkeys(protocol.DISTANCES, _distance)
+    return read_table(value, where, {}, checks)
+
+
+def _distance(value, where):
+    return _words([value], where)[0] if isinstance(value, str) else number(0, 1e300)(value, where)
+
+
+def _method(value, where):
+    entry = read_table(value, where, {"name": text}, {"adapter": _words, "request": _words, "claims": _claims,
+                                                      "tier": choice("tier", ["full"])})
+    if ("adapter" in entry) == ("request" in entry) or ("claims" in entry and "adapter" in entry):
+        raise LabError(f"{where}: a method has an adapter or a request with optional claims")
+    return entry
+
+
+def _models(value, where):
+    if isinstance(value, dict):
+        return read_table(value, where, dict.fromkeys(("quick", "full"), _models_of_tier))
+    return _models_of_tier(value, where)
+
+
+def _models_of_tier(value, where):
+    return value if value == "all" else number(1, 1e9, int)(value, where)
+
+
+REQUIRED = {"question": text, "corpus": text, "models": _models, "seed": number(0, 4294967295, int),
+            "resolution": number(1, 100_000, int), "seconds": number(0.01, 1e7),
+            "memory_mib": number(1, 1e9, int), "method": list_of(_method)}
+OPTIONAL = {"sample": choice("sample", ["random", "listed"]), "error": number(1e-9, 1),
+            "threads": number(1, 1024, int), "task": choice("task", protocol.TASKS), "classes": list_of(text),
+            "base": text, "without": list_of(text)}
+
+
+def _read_with_base(path, above=()):
+    if path.resolve() in above:
+        raise LabError(f"{path.name}: the file is a base of itself; change the key base")
+    own = read_table(parse(path), path.name, {}, REQUIRED | OPTIONAL)
+    if "base" not in own:
+        return own
+    base = _read_with_base(path.parent / own.pop("base"), (*above, path.resolve()))
+    methods = own.get("method", [])
+    without = {method["name"] for method in methods} | set(own.pop("without", []))
+    methods = methods + [method for method in base.get("method", []) if method["name"] not in without]
+    return {**base, **own, "method": methods}
 
 
 def read_experiment(path):
+    """Returns the keys of an experiment file and of its bases. Raises LabError that names file and key."""
     path = pathlib.Path(path)
     experiment = _read_with_base(path)
-    if difference := (REQUIRED - experiment.keys()) | (experiment.keys() - REQUIRED - OPTIONAL):
-        raise LabError(f"{path}: unknown or missing keys: {', '.join(sorted(difference))}")
-    allowed = {"name", "request"}, {"name", "request", "claims"}, {"name", "adapter"}
-    if any(method.keys() - {"tier"} not in allowed for method in experiment["method"]):
-        raise LabError(f"{path}: a [[method]] has a name, and an adapter or a request with optional claims")
-    if any(method.get("tier", "full") != "full" for method in experiment["method"]):
-        raise LabError(f"{path}: the tier of a [[method]] must be \"full\" or absent")
-    if (task := experiment.get("task", "remesh")) not in protocol.TASKS:
-        raise LabError(f"{path}: unknown task '{task}'; expected {', '.join(protocol.TASKS)}")
-    if task == "simplify" and "error" not in experiment:
+    if missing := REQUIRED.keys() - experiment.keys():
+        raise LabError(f"{path}: missing keys: {', '.join(sorted(missing))}")
+    if not experiment["method"]:
+        raise LabError(f"{path}: it needs a [[method]]")
+    if experiment.get("task") == "simplify" and "error" not in experiment:
         raise LabError(f"{path}: the task simplify requires an error")
     return experiment
 

@@ -179,7 +179,7 @@ def _listen(process, answers, limits, take):
         is_ready = select.select([answers], [], [], 0 if has_ended else POLL_SECONDS)[0]
         if is_ready and (data := answers.read(1 << 16)):
             *lines, buffer = (buffer + data).split(b"\n")
-            for answer in filter(None, map(_parsed, lines)):
+            for answer in filter(None, map(parsed, lines)):
                 if "stage" not in answer:  # progress does not show that a step will end
                     step = time.monotonic()
                 take(answer)
@@ -198,8 +198,9 @@ def _has_ended(process):
     return os.waitid(os.P_PID, process.pid, os.WEXITED | os.WNOHANG | os.WNOWAIT) is not None
 
 
-def _parsed(line):
-    with contextlib.suppress(ValueError):
+def parsed(line):
+    """Returns the object in a line of JSON; None if there is none."""
+    with contextlib.suppress(ValueError, RecursionError):  # the latter for deep nesting
         answer = json.loads(line)
         return answer if isinstance(answer, dict) else None
 

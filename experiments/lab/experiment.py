@@ -10,12 +10,13 @@ The vocabulary of the files is what the program states of itself (Program.descri
 
 import difflib
 import itertools
+import os
 import pathlib
 import re
 import tomllib
 
 from . import ablations
-from .rows import LabError, ROOT, all_columns, readable
+from .rows import LabError, ROOT, all_columns, readable, shown
 
 ALL = 0  # as a number of samples
 KINDS = ("extraction", "voxelization", "measurement")
@@ -43,7 +44,7 @@ def joined(names, like=""):
     """Returns names with commas between them, at most eight, the most similar to `like` first."""
     names = sorted(names, key=lambda name: -difflib.SequenceMatcher(None, name, like).ratio())
     more = f" and {len(names) - 8} more" if len(names) > 8 else ""
-    return ", ".join(names[:8]) + more
+    return ", ".join(map(shown, names[:8])) + more
 
 
 def file_name(text):
@@ -80,7 +81,8 @@ def choice(kind, known):
         if text(value, where) and known is not None and value not in known:
             everything = "experiments/lab/columns.toml" if kind == "column" else "`hermesh list`"
             more = f"; {everything} lists all" if len(known) > 8 else ""
-            raise LabError(f'{where}: there is no {kind} "{value}"; expected one of {joined(known, value)}{more}')
+            raise LabError(f'{where}: there is no {kind} "{shown(value)}"; expected one of '
+                           f"{joined(known, value)}{more}")
         return value
     return check
 
@@ -91,7 +93,7 @@ def list_of(check, distinct=False):
             raise LabError(f"{where} must be a list that is not empty")
         items = [check(item, f"{where}[{at}]") for at, item in enumerate(value)]
         if twice := [item for item in items if distinct and items.count(item) > 1]:
-            raise LabError(f'{where} has "{twice[0]}" twice')
+            raise LabError(f'{where} has "{shown(twice[0])}" twice')
         return items
     return check_list
 
@@ -115,7 +117,7 @@ def read_table(value, where, required, optional={}):
     keys = required | optional
     for key in value:
         if key not in keys:
-            raise LabError(f'{where}: unknown key "{key}"; expected one of {joined(keys, key)}')
+            raise LabError(f'{where}: unknown key "{shown(key)}"; expected one of {joined(keys, key)}')
     for key in required:
         if key not in value:
             raise LabError(f'{where} needs the key "{key}"')
@@ -141,9 +143,9 @@ def option_problems(name, declared, given):
     known = {option["name"]: option for option in declared}
     for key, value in given.items():
         if key not in known:
-            yield key, f"{name} has no option '{key}'; it takes {joined(known, key) or 'none'}"
+            yield key, f"{name} has no option '{shown(key)}'; it takes {joined(known, key) or 'none'}"
         elif wanted := _mismatch(known[key], value):
-            yield key, f"option '{key}' of {name} cannot be '{value}'; it takes {wanted}"
+            yield key, f"option '{key}' of {name} cannot be '{shown(value)}'; it takes {wanted}"
     values = {key: given.get(key, option["default"]) for key, option in known.items()}
     for key in known.keys() & given.keys():
         for condition in known[key].get("only_with", []):
@@ -216,7 +218,8 @@ def _variants(kind, table):
             if entry["uniform"]:
                 choice(f"{kind} above", labels)(entry["uniform"], f"{where}[{at}].uniform")
             if entry["label"] in labels:
-                raise LabError(f'{where}[{at}]: two rows would have the label "{entry["label"]}"; change one')
+                raise LabError(f'{where}[{at}]: two rows would have the label "{shown(entry["label"])}"; '
+                               "change one")
             labels.append(entry["label"])
         return entries
     return check
@@ -230,14 +233,14 @@ def _sweep(value, where):
     if not isinstance(value, dict) or len(value) != 1:
         raise LabError(f"{where} must be {{ parameter = [values] }} of the case's recipe")
     (parameter, values), = value.items()
-    values = list_of(number(-1e9, 1e9))(values, f"{where}.{parameter}")
+    values = list_of(number(-1e9, 1e9))(values, f"{where}.{shown(parameter)}")
     return [{"parameter": parameter, "value": value} for value in values]
 
 
 def _case_name(known):
     def check(value, where):
         # A missing mesh file is not an error of the experiment file; its rows state it.
-        is_file = _MESH_FILE.search(text(value, where)) or pathlib.Path(value).is_file()
+        is_file = _MESH_FILE.search(text(value, where)) or os.path.isfile(value)
         return value if is_file else choice("case or mesh file", known)(value, where)
     return check
 
@@ -303,14 +306,17 @@ def _shows(value, where):
 
 # ---- Files
 
-def _parse(path):
+def parse(path):
+    """Returns the table in a TOML file. Raises LabError for a missing file and for a syntax error."""
     path = pathlib.Path(path)
-    if not path.is_file():
-        raise LabError(f"there is no experiment file {path}; `hermesh list` lists the project's")
+    if not os.path.isfile(path):
+        raise LabError(f"there is no experiment file {shown(path, 1000)}; `hermesh list` lists the project's")
     try:
         return tomllib.loads(path.read_text())
     except ValueError as error:
-        raise LabError(f"{path.name}: {error}") from None
+        raise LabError(f"{path.name}: {shown(error, 200)}") from None
+    except RecursionError:
+        raise LabError(f"{path.name}: it is nested too deeply to be read") from None
 
 
 def read_experiment(path, vocabulary):
@@ -320,7 +326,7 @@ def read_experiment(path, vocabulary):
     type, a value out of range, a name or option that is not in the vocabulary, a label that is used twice.
     """
     path = pathlib.Path(path)
-    document, where = _parse(path), path.name
+    document, where = parse(path), path.name
     kind = choice("kind", KINDS)(document.get("kind", "extraction"), f"{where}: kind")
     cases, columns = vocabulary["cases"], [column.name for column in all_columns()]
     required, optional = {"question": text}, {"kind": text, "shows": list_of(_shows)}
@@ -355,7 +361,7 @@ def list_experiments():
     files = [file for folder in folders for file in folder.rglob("*.toml")]
     experiments = []
     for file in sorted(files, key=lambda file: file.name):
-        head = {key: value for key, value in _parse(file).items() if key in ("question", "shows")}
+        head = {key: value for key, value in parse(file).items() if key in ("question", "shows")}
         head = read_table(head, file.name, {"question": text}, {"shows": list_of(_shows)})
         experiments.append({"name": file.stem, "file": file, "shows": []} | head)
     return experiments

@@ -5,6 +5,7 @@ import math
 import os
 
 from . import polygons
+from .rows import shown
 
 TASKS = ("remesh", "simplify", "combine", "fracture")
 NOT_INSTALLED = 77  # exit code of an adapter whose program is not installed
@@ -33,7 +34,7 @@ def write_request(directory, **values):
 
 def _check_number(name, value):
     if isinstance(value, bool) or not isinstance(value, (int, float)) or not 0 <= value < math.inf:
-        raise ValueError(f"{name} must be a number of at least 0, not {value!r}")
+        raise ValueError(f"{name} must be a number of at least 0, not {shown(repr(value))}")
 
 
 def check_claims(claims):
@@ -42,9 +43,9 @@ def check_claims(claims):
         raise ValueError("claims must be an object")
     for name, value in claims.items():
         if name not in CLAIMS | DISTANCES:
-            raise ValueError(f"unknown claim '{name}'; expected {', '.join([*CLAIMS, *DISTANCES])}")
+            raise ValueError(f"unknown claim '{shown(name)}'; expected {', '.join([*CLAIMS, *DISTANCES])}")
         if name in CLAIMS and not isinstance(value, bool | None):
-            raise ValueError(f"claims.{name} must be true or false, not {value!r}")
+            raise ValueError(f"claims.{name} must be true or false, not {shown(repr(value))}")
         if name in DISTANCES and value is not None:
             _check_number(f"claims.{name}", value)
     return {name: value for name, value in claims.items() if value is not None}
@@ -58,7 +59,9 @@ def read_result(path):
     except FileNotFoundError:
         raise ValueError("no result was written to request.result") from None
     except (ValueError, OSError) as error:
-        raise ValueError(f"the result is not JSON: {error}") from None
+        raise ValueError(f"the result is not JSON: {shown(error, 200)}") from None
+    except RecursionError:
+        raise ValueError("the result is nested too deeply to be read") from None
     if not isinstance(result, dict) or result.get("status") not in ("done", "refused"):
         raise ValueError("the status of the result must be done or refused")
     if result.get("seconds") is not None:

@@ -8,6 +8,7 @@ import json
 import math
 import os
 import pathlib
+import re
 import tomllib
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
@@ -15,6 +16,12 @@ ROOT = pathlib.Path(__file__).resolve().parents[2]
 
 class LabError(Exception):
     """An error that the user can mend; its text states what is wrong, where, and what to do."""
+
+
+def shown(value, limit=60):
+    """Returns a value from a file as part of a message: short, and without control characters."""
+    text = re.sub(r"[\x00-\x1f\x7f-\x9f\ud800-\udfff]+", "?", str(value))
+    return text if len(text) <= limit else text[:limit] + "..."
 
 
 @dataclasses.dataclass(frozen=True)

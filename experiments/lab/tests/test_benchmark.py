@@ -223,7 +223,7 @@ class Experiments(unittest.TestCase):
 
     def test_methods(self):
         numbers = "".join(f"{key} = 1\n" for key in ("models", "seed", "resolution", "seconds", "memory_mib"))
-        head = f'question = ""\ncorpus = ""\n{numbers}[[method]]\nname = "a"\n'
+        head = f'question = "q"\ncorpus = "c"\n{numbers}[[method]]\nname = "a"\n'
         with tempfile.TemporaryDirectory() as work:
             file = pathlib.Path(work) / "a.toml"
             for method, is_right in (('request = ["a"]', True), ('adapter = ["a"]', True), ("", False),
@@ -245,6 +245,9 @@ class Experiments(unittest.TestCase):
             other = pathlib.Path(work) / "b.toml"
             other.write_text('base = "a.toml"\nresolution = 5')
             self.assertEqual(benchmark.read_experiment(other)["resolution"], 5)
+            file.write_text('base = "b.toml"')
+            with self.assertRaises(LabError):
+                benchmark.read_experiment(other)
 
 
 class Polygons(unittest.TestCase):
