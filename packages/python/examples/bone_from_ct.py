@@ -44,7 +44,7 @@ if len(sys.argv) > 1:
 
 # Without models it prints
 #   scan: 100 x 110 x 80 samples, -1000 to 1200 HU
-#   bone: 10974 triangles, 2 surfaces, 667.5 cm³
+#   bone: 10966 triangles, 2 surfaces, 667.5 cm³
 #   watertight: True
 
 # With that of $HERMESH_DATA it prints

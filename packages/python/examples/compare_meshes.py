@@ -28,8 +28,8 @@ for name, mesh in meshes.items():
 
 # Without models it prints
 #   mesh                       triangles  to the part [voxels]  from the part [voxels]  watertight  solid
-#   marching cubes                 67560  0.664 to 0.672         1.155 to 1.170           True        same
-#   manifold dual contouring        1176  0.107 to 0.121         0.112 to 0.126           True        same
+#   marching cubes                 67332  0.664 to 0.672         1.155 to 1.170           True        same
+#   manifold dual contouring        1164  0.111 to 0.125         0.112 to 0.126           True        same
 
 # With that of $HERMESH_DATA it prints
 #   mesh                       triangles  to the part [voxels]  from the part [voxels]  watertight  solid
