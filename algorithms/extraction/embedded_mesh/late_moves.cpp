@@ -96,6 +96,8 @@ class Star {
   /// meanwhile (move_points()), and reverts it on failure.
   bool moves_to(const Vector3d& place, std::vector<CellBlocks::Edge>& turned) {
     const Vector3d before = points_[point_];
+    areas_.clear();
+    for (const SidedTriangle& t : star_) areas_.push_back(area(t.corners));
     points_[point_] = place;
     const std::vector<std::size_t> quads = turn_quads();
     const bool fits = is_embedded() && meets_nothing() && keeps_orientation(before);
@@ -115,8 +117,13 @@ class Star {
     return {t, cells_.grid().pieces(edge.block, edge.sample, edge.axis), edge};
   }
   bool has_point(const Triangle& t) const { return t[0] == point_ || t[1] == point_ || t[2] == point_; }
-  bool has_area(const Triangle& t) const {
-    return (points_[t[1]] - points_[t[0]]).cross(points_[t[2]] - points_[t[0]]).norm() >= kLeastArea;
+  double area(const Triangle& t) const {
+    return (points_[t[1]] - points_[t[0]]).cross(points_[t[2]] - points_[t[0]]).norm();
+  }
+  /// Returns true if the triangle of number i in the star, or in its place, has an area: at least half of
+  /// what it had before the move if that was small, as at margins of cells.
+  bool has_area(std::size_t i, const Triangle& t) const {
+    return area(t) >= std::min(kLeastArea, t == star_[i].corners ? 0.5 * areas_[i] : kLeastArea);
   }
 
   /// Sets `moved_` to the star with other diagonals where needed, and returns where their first triangles
@@ -127,7 +134,7 @@ class Star {
     for (std::size_t i = 0; i + 1 < moved_.size(); ++i) {
       if (moved_[i].edge != moved_[i + 1].edge || polygons_.is_fanned(moved_[i].edge)) continue;
       const Triangle first = moved_[i].corners, second = moved_[i + 1].corners;
-      if (!has_area(first) || !has_area(second)) {
+      if (!has_area(i, first) || !has_area(i + 1, second)) {
         moved_[i].corners = {first[1], first[2], second[2]};
         moved_[i + 1].corners = {first[1], second[2], first[0]};
         turned.push_back(i);
@@ -140,7 +147,7 @@ class Star {
   bool is_embedded() const {
     for (std::size_t i = 0; i < moved_.size(); ++i) {
       const Triangle& t = moved_[i].corners;
-      if (!has_area(t)) return false;
+      if (!has_area(i, t)) return false;
       for (std::size_t j = i + 1; j < moved_.size(); ++j)
         if (!mesh_.apart(t, moved_[j].corners)) return false;
     }
@@ -224,6 +231,7 @@ class Star {
   std::uint32_t point_ = 0;
   Bounds box_;
   std::vector<SidedTriangle> star_;   ///< the two triangles of a quad one after the other
+  std::vector<double> areas_;         ///< of the star before the move, twice
   std::vector<SidedTriangle> moved_;  ///< the same after the move that is tried
   std::optional<std::vector<SidedTriangle>> nearby_;
 };
