@@ -6,6 +6,7 @@
 #include <numbers>
 #include <sstream>
 
+#include "algorithms/io/mesh_file.h"
 #include "experiments/cli/process_for_tests.h"
 
 namespace hermesh::cli {
@@ -214,6 +215,24 @@ TEST_F(RightAnswersTest, ColoursAreTransferredOrNoted) {
     if (!(words >> word) || word != "v") continue;
     ASSERT_TRUE(words >> x >> y >> z >> red >> green >> blue) << line;
     EXPECT_NEAR(red + blue, 1.0, 0.02) << line;
+  }
+  // Through all formats that store colours, within 2 of 255 away from the border.
+  for (const char* file : {"c.ply", "c.obj", "c.glb", "c.gltf", "c.3mf"}) {
+    run_to(0, {"remesh", input("t50_two_colours.ply"), file, "--resolution", "20"});
+    run_to(0, {"remesh", file, "back.ply", "--resolution", "20"});
+    RunContext context;
+    const MeshFile mesh = read_mesh_file(path("back.ply"), context, {.attributes = true});
+    ASSERT_EQ(mesh.attributes.size(), 1u) << file;
+    const auto& values = std::get<0>(mesh.attributes[0].values);
+    std::size_t above = 0, below = 0;
+    for (std::size_t i = 0; i < mesh.points.size(); ++i) {
+      const double z = mesh.points[i].z();
+      if (std::abs(z) < 0.3) continue;
+      ++(z > 0 ? above : below);
+      EXPECT_NEAR(values[3 * i], z > 0 ? 1.0 : 0.0, 2.0 / 255.0) << file << ' ' << z;
+      EXPECT_NEAR(values[3 * i + 2], z > 0 ? 0.0 : 1.0, 2.0 / 255.0) << file << ' ' << z;
+    }
+    EXPECT_GT(std::min(above, below), 20u) << file;
   }
   const Outcome lost = run({"remesh", input("t50_two_colours.ply"), "out.stl", "--resolution", "20"});
   EXPECT_PRED2(has, lost.err, "colour") << lost.err;
