@@ -27,6 +27,22 @@ class SurroundingsTest : public ProgramTest {
   }
 };
 
+TEST_F(SurroundingsTest, ALimitThatAllowsNoThreadIsAMessage) {
+#ifdef __SANITIZE_ADDRESS__
+  GTEST_SKIP() << "the sanitizer reserves more than any limit";
+#endif
+  int refusals = 0;
+  for (int kib = 60'000; kib <= 200'000; kib += 10'000) {
+    const Outcome outcome = run_shell("ulimit -v " + std::to_string(kib) + "; $H list");
+    // Under the least limits the system's loader fails.
+    if (outcome.exit_code == 0 || outcome.exit_code == 127) continue;
+    EXPECT_EQ(outcome.exit_code, 1) << kib << outcome.err;
+    EXPECT_TRUE(outcome.err.starts_with("hermesh: ")) << kib << outcome.err;
+    ++refusals;
+  }
+  EXPECT_GT(refusals, 0);
+}
+
 TEST_F(SurroundingsTest, ClosedStreamsAreErrors) {
   write_sphere();
   for (const char* script : {"$H remesh - out.off --resolution 8 <&-", "$H validate - <&-",

@@ -10,8 +10,11 @@
 #include <cstdio>
 #include <cstring>
 #include <ctime>
+#include <exception>
 #include <iostream>
 #include <new>
+#include <string_view>
+#include <system_error>
 
 #include "algorithms/core/shown.h"
 #include "algorithms/thesis/voxels/dense_hermite.h"
@@ -27,6 +30,18 @@ namespace {
 
 /// Longest error or note, in bytes. Quotations from files are shorter; the names of files may be long.
 constexpr std::size_t kLongest = 1500;
+
+constexpr std::string_view kNoThread =
+    "no thread can be started: raise the limit of memory (ulimit -v) or of processes (ulimit -u)";
+
+/// Returns the message of an exception that is not an Error, from the standard library or another one.
+std::string message_of(const std::exception& error) {
+  if (dynamic_cast<const std::bad_alloc*>(&error))
+    return "out of memory: use larger voxels, a smaller mesh or a machine with more memory";
+  const auto* const system = dynamic_cast<const std::system_error*>(&error);
+  return std::string(system && system->code() == std::errc::resource_unavailable_try_again ? kNoThread
+                                                                                           : error.what());
+}
 
 int fail(int exit_code, const std::string& message) {
   // Messages of libraries may have line breaks, and names of files control characters; scripts rely on one
@@ -156,9 +171,7 @@ int run_command(Session& session, CommandFiles* files) {
 /// Returns the exit code and the message for an exception that ended the command.
 std::pair<int, std::string> failure(const std::exception& error, const Session& session) {
   if (dynamic_cast<const UsageError*>(&error)) return {kUsage, session.named(error.what())};
-  if (dynamic_cast<const std::bad_alloc*>(&error))
-    return {kFailed, "out of memory: use larger voxels, a smaller mesh or a machine with more memory"};
-  return {kFailed, session.named(error.what())};
+  return {kFailed, session.named(message_of(error))};
 }
 
 /// Runs the command; returns the exit code, and prints the message of a failure.
@@ -213,10 +226,24 @@ int run_program(int argc, char** argv) {
   return exit_code;
 }
 
+std::terminate_handler usual_end;
+
+/// Runs before the initialisers of the libraries. That of log4cplus, which OpenVDB uses, starts threads, and
+/// nobody could catch its exception if the limit of memory or of processes allows none.
+void prepare_libraries(int, char**, char**) {
+  usual_end = std::set_terminate([] {
+    for (const std::string_view text : {std::string_view("hermesh: "), kNoThread, std::string_view("\n")})
+      if (write(STDERR_FILENO, text.data(), text.size()) < 0) break;
+    _exit(kFailed);
+  });
+}
+[[gnu::used, gnu::section(".preinit_array")]] void (*const first)(int, char**, char**) = prepare_libraries;
+
 }  // namespace
 }  // namespace hermesh::cli
 
 int main(int argc, char** argv) {
+  std::set_terminate(hermesh::cli::usual_end);
   // Static initialisers are compiled for x86-64-v2, too, but are unlikely to need it.
   if (!__builtin_cpu_supports("sse4.2") || !__builtin_cpu_supports("popcnt"))
     return hermesh::cli::fail(
@@ -228,6 +255,6 @@ int main(int argc, char** argv) {
     hermesh::register_dense_grids();
     return hermesh::cli::run_program(argc, argv);
   } catch (const std::exception& error) {
-    return hermesh::cli::fail(hermesh::cli::kFailed, error.what());
+    return hermesh::cli::fail(hermesh::cli::kFailed, hermesh::cli::message_of(error));
   }
 }
