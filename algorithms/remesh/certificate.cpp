@@ -138,7 +138,7 @@ class Cover {
     const double largest = line.cwiseAbs().maxCoeff();
     if (!(largest > 0.0)) return false;
     for (double& c : line) c = std::round(c / largest * kLargest);
-    // A part whose corners are all closer to the line than this is empty but for rounding.
+    // A part whose corners are all closer to the line than this is empty, apart from rounding.
     constexpr double kOnLine = 8.0;
     Piece parts[2];
     bool has[2] = {};

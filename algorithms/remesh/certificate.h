@@ -56,7 +56,7 @@ struct CertificateReport {
 /// Writes a certificate of the distance between two meshes, in either direction. Parts that are farther away
 /// are not covered, and reported.
 /// @param input as read, with MeshFile::triangle_numbers
-/// @param output the mesh as it is written; without quads
+/// @param output the mesh that is written, which must have triangles only
 /// @throws Error if the file cannot be written; Cancelled
 CertificateReport write_certificate(const std::filesystem::path& path, const MeshFile& input,
                                     const PolygonMesh& output, double error, RunContext& context);

@@ -25,8 +25,10 @@ here=experiments/fuzzing out=build/fuzz
 # Sources whose coverage is printed.
 declare -A sources=(
   [ply]='io/mesh_file_ply.cpp' [obj]='io/mesh_file_obj.cpp' [off]='io/mesh_file_off.cpp'
-  [stl]='io/mesh_file_stl.cpp' [gltf]='io/scenes/gltf_read.cpp io/scenes/gltf_document.cpp io/scenes/scene_files.cpp'
-  [three_mf]='io/scenes/three_mf_read.cpp io/scenes/xml_reader.h io/scenes/zip_archive.cpp' [nifti]='io/import/import_volume.cpp'
+  [stl]='io/mesh_file_stl.cpp'
+  [gltf]='io/scenes/gltf_read.cpp io/scenes/gltf_document.cpp io/scenes/scene_files.cpp'
+  [three_mf]='io/scenes/three_mf_read.cpp io/scenes/xml_reader.h io/scenes/zip_archive.cpp'
+  [nifti]='io/import/import_volume.cpp'
   [raw]='io/import/import_volume.cpp'
   [vdb]='io/vdb_structure.cpp io/vdb_archive.cpp io/vdb_file.cpp io/grid_frame.cpp'
   [command_line]='cli/command_line.cpp cli/files.cpp cli/session.cpp' [job]='harness/read_job.cpp')

@@ -178,9 +178,9 @@ def finer(bench, mesh, words, random):
 
 
 # By relation: its function, and the largest distance that is allowed for each kind of method, in voxels
-# (otherwise 0). Two meshes within a tenth of a voxel of the same uniform mesh are at most a fifth apart. A turned
-# cell may be triangulated otherwise: by a table up to its diagonal apart, in dual contouring where quads are
-# not plane.
+# (otherwise 0). Two meshes within a tenth of a voxel of the same uniform mesh are at most a fifth apart. A
+# turned cell may be triangulated differently: with a table up to its diagonal apart, in dual contouring where
+# quads are not plane.
 _EXACT, _ANY = {"uniform": 1e-4, "tables": 1e-4}, {"tolerance": 0.2, "other": 0.25, "free": 1.0}
 RELATIONS = {
     "number of threads": (threads, {}), "scale by a power of two": (scaled, {"other": 0.25}),

@@ -106,8 +106,8 @@ Eigen::Vector3d Qef::minimiser_within(const Eigen::Vector3d& lower, const Eigen:
   // Free coordinates start at the mass point, moved into the box, which is the result if no choice is better.
   const Eigen::Vector3d mass = (sum_ / planes_).cwiseMax(low).cwiseMin(high);
   Eigen::Vector3d best = mass;
-  // A line of minima leaves the box by two faces, with the same error but for rounding: the nearer one
-  // counts.
+  // A line of minima leaves the box through two faces. The errors there differ only by rounding, so the face
+  // nearer to the mass point is taken.
   const auto cost = [&](const Eigen::Vector3d& x) {
     return error(anchor_ + x) + kPreferNear * (x - mass).squaredNorm();
   };

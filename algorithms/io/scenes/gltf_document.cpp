@@ -73,7 +73,7 @@ std::string bytes_of_uri(std::string_view uri, const MeshBuilder& builder) {
     fail(" is an address; only files in the directory of the file are read, so save it there");
   const std::filesystem::path folder = std::filesystem::path(builder.file()).parent_path() / ".";
   std::error_code error;
-  // Some programs do not encode names, so % is no escape there.
+  // Some programs do not encode names; a % in them stands for itself.
   std::filesystem::path relative = decode_percents(uri);
   if (!stays_below(relative) || !std::filesystem::is_regular_file(folder / relative, error))
     if (stays_below(uri) && std::filesystem::is_regular_file(folder / uri, error)) relative = uri;
@@ -151,7 +151,7 @@ GltfDocument::GltfDocument(std::string_view json, std::string_view binary, MeshB
     // A number beyond double precision.
     builder_.fail("its JSON holds a number that is too large; the file is damaged");
   }
-  if (!root_.is_object()) builder_.fail("its JSON is no object; the file is damaged or no glTF");
+  if (!root_.is_object()) builder_.fail("its JSON is not an object; the file is damaged or not glTF");
   const Json* const asset = member(root_, "asset");
   const Json* const version = asset ? member(*asset, "version") : nullptr;
   if (!version || !version->is_string()) builder_.fail("it does not say which version of glTF it is");
@@ -196,7 +196,7 @@ const Json& GltfDocument::entry(const char* key, std::size_t index) const {
     builder_.fail("it refers to number ", index, " of '", key, "', but there are ", entries.size(),
                   " (counting from 0)");
   if (!entries[index].is_object())
-    builder_.fail("number ", index, " of its '", key, "' is no object; the file is damaged");
+    builder_.fail("number ", index, " of its '", key, "' is not an object; the file is damaged");
   return entries[index];
 }
 

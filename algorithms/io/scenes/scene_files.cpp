@@ -44,22 +44,25 @@ void PartPlacer::place(const ScenePart& part, const Placement& placement) {
 
 void PartPlacer::place_attributes(const ScenePart& part, bool mirrored) {
   AttributeTable& table = *builder_.attributes();
+  // The column of each kind of value that the part has.
+  const auto number_of = [this](bool has_values, const char* name) { return has_values ? column(name) : 0; };
+  const std::size_t colour = number_of(!part.colours.empty(), "colour"),
+                    material = number_of(!part.materials.empty(), "material"),
+                    uv = number_of(!part.texture_coordinates.empty(), "uv");
   for (std::size_t i = 0; i < part.points.size(); ++i) {
     table.begin(AttributeDomain::point);
     if (i >= part.colours.size() || std::isnan(part.colours[i][0])) continue;
-    for (int k = 0; k < colour_components_; ++k)
-      table.set(column("colour"), k, part.colours[i][std::size_t(k)]);
+    for (int k = 0; k < colour_components_; ++k) table.set(colour, k, part.colours[i][std::size_t(k)]);
   }
   for (std::size_t t = 0; t < part.triangles.size(); ++t) {
     if (part.triangles[t][0] == ScenePart::kLeftOut) continue;
     table.begin(AttributeDomain::polygon);
-    if (t < part.materials.size() && part.materials[t] >= 0)
-      table.set(column("material"), 0, part.materials[t]);
+    if (t < part.materials.size() && part.materials[t] >= 0) table.set(material, 0, part.materials[t]);
     for (const std::size_t corner : {0, mirrored ? 2 : 1, mirrored ? 1 : 2}) {
       table.begin(AttributeDomain::corner);
       const std::size_t at = 3 * t + corner;
       if (at >= part.texture_coordinates.size() || std::isnan(part.texture_coordinates[at][0])) continue;
-      for (int k = 0; k < 2; ++k) table.set(column("uv"), k, part.texture_coordinates[at][std::size_t(k)]);
+      for (int k = 0; k < 2; ++k) table.set(uv, k, part.texture_coordinates[at][std::size_t(k)]);
     }
   }
 }

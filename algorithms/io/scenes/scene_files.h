@@ -98,8 +98,7 @@ struct ScenePart {
                   colours.size() * sizeof(colours[0]) + materials.size() * sizeof(materials[0]) +
                   texture_coordinates.size() * sizeof(texture_coordinates[0]));
   }
-  /// Sets the colour of a point, which must be among the first of its number to have one, or the newest.
-  /// Returns false if it has another colour already, which then stays.
+  /// Sets the colour of a point. Returns false if the point already has another colour, which it keeps.
   bool set_colour(std::uint32_t point, const std::array<float, 4>& colour);
 };
 
